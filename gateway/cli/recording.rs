@@ -2,8 +2,8 @@
 
 use super::lang::{localize_text, pick_text};
 use super::{CannotRun, CommandOutcome, CommandResult, print_text};
-use crate::diagnosis::map_file::{MapProposal, first_rows};
-use crate::diagnosis::{describe_reading, write_output};
+use crate::diagnosis::map_file::{MapProposal, ProposalError, first_rows, verify_proposal};
+use crate::diagnosis::{describe_reading, describe_refusals, loses_too_much, write_output};
 use adapters::channel::ChannelId;
 use adapters::channel::unit::Unit;
 use adapters::recording::Mapping;
@@ -68,12 +68,11 @@ fn preview_file(file: &RecordingFile) -> Result<(Preview, Mapping), CannotRun> {
 
 fn show_file(file: &RecordingFile) -> CommandResult {
     let (found, _) = preview_file(file)?;
-    print_preview(&found, &file.file)?;
-    Ok(CommandOutcome::Fine)
+    print_preview(&found, &file.file)
 }
 
-/// What was assumed, and the first rows.
-fn print_preview(found: &Preview, path: &Path) -> Result<(), CannotRun> {
+/// What was assumed, and the first rows. Where more is refused than a recording may lose, the answer is no.
+fn print_preview(found: &Preview, path: &Path) -> CommandResult {
     let name = path.display().to_string();
     let read = found
         .read
@@ -84,7 +83,10 @@ fn print_preview(found: &Preview, path: &Path) -> Result<(), CannotRun> {
     let refused = read.refused;
     print_text(pick_text(&format!("{rows} rows, {refused} refused\n"), &format!("{rows}行，拒绝{refused}行\n")));
     print_text(&first_rows(&read.recording, SHOWN.0, SHOWN.1));
-    Ok(())
+    if let Some(refusals) = describe_refusals(&name, read) {
+        print_text(&format!("{}\n", localize_text(&refusals)));
+    }
+    Ok(if loses_too_much(read) { CommandOutcome::No } else { CommandOutcome::Fine })
 }
 
 fn map(file: &RecordingFile, out: Option<&Path>, yes: bool) -> CommandResult {
@@ -93,17 +95,23 @@ fn map(file: &RecordingFile, out: Option<&Path>, yes: bool) -> CommandResult {
     if out.is_file() {
         return keep_map(file, out);
     }
-    let (found, _) = preview_file(file)?;
-    let mut proposal = MapProposal::from_preview(&found);
+    let (found, base) = preview_file(file)?;
+    let mut proposal = MapProposal::from_preview(&found, &base);
     let asks = !yes && std::io::stdin().is_terminal();
-    if asks {
-        ask_all(&mut proposal, &found);
-    }
+    let answered = if asks { ask_all(&mut proposal, &found) } else { Vec::new() };
     let statement =
         found.read.as_ref().map(adapters::recording::ReadRecording::describe_assumptions).unwrap_or_default();
     let name = file.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let text = proposal.to_toml(&statement, &name);
-    Mapping::parse(&text, "map").map_err(|wrong| CannotRun::new(wrong.to_string(), ""))?;
+    let after = verify_proposal(&file.file, &text, &found, &answered).map_err(|error| {
+        let zh = match &error {
+            ProposalError::ReadsOtherwise(difference) => {
+                format!("未写入映射文件：按它读取结果会不同（{}）；不用映射文件即可读取", difference.zh)
+            }
+            ProposalError::Invalid(wrong) => format!("映射文件无效：{wrong}"),
+        };
+        CannotRun::new(pick_text(&error.to_string(), &zh), "")
+    })?;
     write_output(out, &text).map_err(CannotRun::from_error)?;
     if out.as_os_str() == "-" {
         return Ok(CommandOutcome::Fine);
@@ -114,32 +122,29 @@ fn map(file: &RecordingFile, out: Option<&Path>, yes: bool) -> CommandResult {
         let en = format!("{unsure} columns are not sure and keep their names; they are marked in {path}\n");
         print_text(pick_text(&en, &format!("{unsure}列不能确定，保留原名；已在{path}中标出\n")));
     }
-    let (after, _) = preview_file(&RecordingFile { file: file.file.clone(), map: Some(out.to_owned()) })?;
-    print_preview(&after, &file.file)?;
+    let outcome = print_preview(&after, &file.file)?;
     print_text(pick_text(&format!("written: {path}\n"), &format!("已写入：{path}\n")));
-    Ok(CommandOutcome::Fine)
+    Ok(outcome)
 }
 
 /// A map that is there already may hold what a person has written: a unit, a factor, a zone. It stays, and is shown.
 fn keep_map(file: &RecordingFile, map: &Path) -> CommandResult {
-    show_file(&RecordingFile { file: file.file.clone(), map: Some(map.to_owned()) })?;
+    let outcome = show_file(&RecordingFile { file: file.file.clone(), map: Some(map.to_owned()) })?;
     let path = map.display();
     print_text(pick_text(
         &format!("kept: {path}; edit it, remove it first, or name another with --out\n"),
         &format!("保留：{path}；请编辑它、先删除它，或用--out指定其他文件\n"),
     ));
-    Ok(CommandOutcome::Fine)
+    Ok(outcome)
 }
 
-/// One question for each column that may be one of ours, and one for the time where none is known.
-fn ask_all(proposal: &mut MapProposal, found: &Preview) {
+/// One question for each column that may be one of ours, and one for the time where none is known. Names, before and after, of the columns that a
+/// person has decided about.
+fn ask_all(proposal: &mut MapProposal, found: &Preview) -> Vec<String> {
     if found.read.is_err() && proposal.columns.iter().all(|column| !column.is_time) {
-        let names: Vec<String> = proposal.columns.iter().map(|column| column.from.clone()).collect();
-        print_text(pick_text("Which column is the time?\n", "哪一列是时间？\n"));
-        if let Some(index) = ask_choice(&names) {
-            proposal.time = Some(names[index].clone());
-        }
+        ask_time(proposal);
     }
+    let mut answered = Vec::new();
     for index in proposal.open_questions() {
         let column = proposal.columns[index].clone();
         let mut options: Vec<String> = column.candidates.iter().map(|name| (*name).to_owned()).collect();
@@ -147,17 +152,36 @@ fn ask_all(proposal: &mut MapProposal, found: &Preview) {
         options.push(pick_text("leave it out", "不读取").to_owned());
         print_text(&format!(
             "{}\n",
-            pick_text(&format!("{}: what is it?", column.from), &format!("{}：是什么？", column.from))
+            pick_text(&format!("{}: what is it?", column.name), &format!("{}：是什么？", column.name))
         ));
         let Some(chosen) = ask_choice(&options) else { continue };
+        let own = column.to.clone().unwrap_or_else(|| column.name.clone());
         let to = match options.len() - chosen {
             1 => String::new(),
-            2 => column.from.clone(),
+            2 => own.clone(),
             _ => options[chosen].clone(),
         };
         let unit =
             unit_needed(&to, &found.columns[index_of(found, &column.from)].unit).then(|| ask_unit(&to)).flatten();
+        answered.extend([own, to.clone()]);
         (proposal.columns[index].to, proposal.columns[index].unit) = (Some(to), unit);
+    }
+    answered
+}
+
+/// Which column is the time, or at which step the rows follow one another.
+fn ask_time(proposal: &mut MapProposal) {
+    let mut options: Vec<String> = proposal.columns.iter().map(|column| column.from.clone()).collect();
+    options.push(pick_text("none: the rows follow one another at an even step", "没有：各行等间隔").to_owned());
+    print_text(pick_text("Which column is the time?\n", "哪一列是时间？\n"));
+    match ask_choice(&options) {
+        Some(index) if index + 1 == options.len() => {
+            print_text(pick_text("how many seconds from one row to the next?\n", "相邻两行间隔多少秒？\n"));
+            let step_s = read_typed_line().and_then(|text| text.replace(',', ".").parse::<f64>().ok());
+            proposal.step = step_s.filter(|step_s| step_s.is_finite() && *step_s > 0.0);
+        }
+        Some(index) => proposal.time = Some(options[index].clone()),
+        None => {}
     }
 }
 

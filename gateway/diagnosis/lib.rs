@@ -29,4 +29,6 @@ pub mod worker;
 pub use join::{JoinError, join_recordings};
 pub use models::{read_hypotheses, read_model};
 pub use outputs::{DiagnosisOutputs, write_output};
-pub use recordings::{InputRecordings, describe_reading, read_recordings, read_recordings_as};
+pub use recordings::{
+    InputRecordings, describe_reading, describe_refusals, loses_too_much, read_recordings, read_recordings_as,
+};

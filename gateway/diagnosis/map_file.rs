@@ -2,16 +2,19 @@
 
 use adapter_core::bilingual::Bilingual;
 use adapter_core::channel::quantity::unit_of;
-use recording::Recording;
-use recording::read::{ColumnPreview, Preview, preview_rows};
+use recording::read::{ColumnPreview, Preview, TimePreview, find_difference, preview_recording, preview_rows};
+use recording::{ColumnMapping, Mapping, Recording};
 use rules::twin::format_toml_text;
 use std::fmt::Write as _;
+use std::path::Path;
 
 /// One column of a proposal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProposedColumn {
-    /// Its name in the file.
+    /// How the map names it.
     pub from: String,
+    /// Its name in the file.
+    pub name: String,
     /// What it becomes; `None`: it keeps its name; empty: it is left out.
     pub to: Option<String>,
     /// Its unit, where the file does not say it or a person says another one.
@@ -22,6 +25,44 @@ pub struct ProposedColumn {
     pub is_time: bool,
 }
 
+/// Why a proposed map is not written.
+#[derive(Debug, thiserror::Error)]
+pub enum ProposalError {
+    /// It is no map.
+    #[error("the map would not be valid: {0}")]
+    Invalid(#[from] recording::MappingError),
+    /// The file reads otherwise under it than without it.
+    #[error("no map is written: under it the file would be read otherwise ({0}); it is read without a map")]
+    ReadsOtherwise(Bilingual),
+}
+
+/// Reads a file back under the map that is proposed for it, before it is kept. A map under which a file that can be read is read otherwise, in
+/// rows, times or in any column of which a person has not said what it is, is refused.
+///
+/// # Errors
+/// See [`ProposalError`].
+pub fn verify_proposal(
+    path: &Path,
+    toml: &str,
+    found: &Preview,
+    answered: &[String],
+) -> Result<Preview, ProposalError> {
+    let mapping = Mapping::parse(toml, "map")?;
+    let otherwise = |error: &recording::RecordingError| {
+        ProposalError::ReadsOtherwise(Bilingual::new(error.to_string(), error.describe_in_chinese()))
+    };
+    let after = preview_recording(path, &mapping).map_err(|error| otherwise(&error))?;
+    match (&found.read, &after.read) {
+        (Ok(before), Ok(read)) => match find_difference(before, read, answered) {
+            Some(difference) => Err(ProposalError::ReadsOtherwise(difference)),
+            None => Ok(after),
+        },
+        (Ok(_), Err(error)) => Err(otherwise(error)),
+        // What cannot be read without a map is no worse with one.
+        (Err(_), _) => Ok(after),
+    }
+}
+
 /// How the columns of a file could be read, before a person has confirmed it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MapProposal {
@@ -29,27 +70,41 @@ pub struct MapProposal {
     pub columns: Vec<ProposedColumn>,
     /// The column of time, where a person said it.
     pub time: Option<String>,
+    /// Seconds from one row to the next, where a person said that there is no column of time.
+    pub step: Option<f64>,
+    /// Where the time was found.
+    pub found: TimePreview,
+    /// The map under which the file was looked at: what it says stays.
+    pub base: Mapping,
 }
 
 impl MapProposal {
     /// From how a file is understood.
     #[must_use]
-    pub fn from_preview(preview: &Preview) -> Self {
+    pub fn from_preview(preview: &Preview, base: &Mapping) -> Self {
         let column = |column: &ColumnPreview| {
             let sure = column
                 .to
                 .clone()
-                .filter(|to| *to != column.from || unit_of(to).is_some() || column.candidates.is_empty());
-            let candidates = if sure.is_some() && sure.as_deref() != Some(column.from.as_str()) {
-                Vec::new()
-            } else {
-                column.candidates.clone()
-            };
-            ProposedColumn { from: column.from.clone(), to: sure, unit: None, candidates, is_time: column.is_time }
+                .filter(|to| *to != column.name || unit_of(to).is_some() || column.candidates.is_empty());
+            let keeps_name = sure.as_deref().is_none_or(|to| to.starts_with(column.name.as_str()));
+            let candidates = if !keeps_name { Vec::new() } else { column.candidates.clone() };
+            let to = sure.or_else(|| column.to.clone());
+            ProposedColumn {
+                from: column.from.clone(),
+                name: column.name.clone(),
+                to,
+                unit: None,
+                candidates,
+                is_time: column.is_time,
+            }
         };
         Self {
-            columns: preview.columns.iter().filter(|column| !column.from.is_empty()).map(column).collect(),
+            columns: preview.columns.iter().filter(|column| !column.name.is_empty()).map(column).collect(),
             time: None,
+            step: None,
+            found: preview.time.clone(),
+            base: base.clone(),
         }
     }
 
@@ -57,8 +112,9 @@ impl MapProposal {
     #[must_use]
     pub fn open_questions(&self) -> Vec<usize> {
         let is_question = |column: &ProposedColumn| {
-            let kept = column.to.as_deref().is_none_or(|to| to == column.from);
-            !column.is_time && kept && column.candidates.iter().any(|candidate| *candidate != column.from)
+            let kept = column.to.as_deref().is_none_or(|to| to.starts_with(column.name.as_str()));
+            let is_said = self.base.column.iter().any(|said| said.from == column.from);
+            !column.is_time && !is_said && kept && column.candidates.iter().any(|candidate| *candidate != column.name)
         };
         (0..self.columns.len()).filter(|index| is_question(&self.columns[*index])).collect()
     }
@@ -74,28 +130,92 @@ impl MapProposal {
         }
         text.push_str(
             "# encoding = \"GBK\"      separator = \";\"      decimal = \",\"      header_line = 3      units_line = 4      sheet = \"Data\"\n\
-             schema = \"map/1\"\n\n[time]\n# unit = \"ms\"      zone = \"Europe/Berlin\"      order = \"dmy\"      clocks = \"rows\"      set_back = \"join\"\n",
+             # names = [\"time_s\", \"spindle_speed_rpm\"]\nschema = \"map/1\"\n",
         );
-        let time = self
-            .time
-            .as_deref()
-            .or_else(|| self.columns.iter().find(|column| column.is_time).map(|column| column.from.as_str()));
-        if let Some(time) = time {
-            let _ = writeln!(text, "column = {}", format_toml_text(time));
+        text.push_str(&form_toml(&self.base));
+        text.push_str(
+            "\n[time]\n# unit = \"ms\"      zone = \"Europe/Berlin\"      order = \"dmy\"      clocks = \"rows\"      set_back = \"join\"      step = 0.1\n",
+        );
+        text.push_str(&self.time_toml());
+        let is_time = |column: &ProposedColumn| column.is_time || Some(&column.from) == self.time.as_ref();
+        for column in self.columns.iter().filter(|column| !is_time(column)) {
+            text.push_str(&column_toml(column, self.base.column.iter().find(|said| said.from == column.from)));
         }
-        for column in self.columns.iter().filter(|column| !column.is_time && Some(column.from.as_str()) != time) {
-            text.push_str(&column_toml(column));
+        for clock in &self.base.clock {
+            let columns: Vec<String> = clock.columns.iter().map(|name| format_toml_text(name)).collect();
+            let _ = write!(text, "\n[[clock]]\ncolumns = [{}]\n", columns.join(", "));
+            push_text(&mut text, "time", clock.time.as_deref());
+            push_number(&mut text, "step", clock.step);
+        }
+        text
+    }
+
+    /// What a person said, else what the map said under which the file was looked at, else what was found.
+    fn time_toml(&self) -> String {
+        let said = &self.base.time;
+        let mut text = String::new();
+        let step = self.step.or(said.step).filter(|_| self.time.is_none());
+        if let Some(step_s) = step {
+            push_number(&mut text, "step", Some(step_s));
+            push_text(&mut text, "start", said.start.as_deref());
+        } else if let Some(time) = &self.time {
+            push_text(&mut text, "column", Some(time));
+        } else {
+            push_text(&mut text, "column", self.found.column.as_deref());
+            push_text(&mut text, "date", self.found.date.as_deref());
+            push_text(&mut text, "clock", self.found.clock.as_deref());
+        }
+        for (key, value) in [
+            ("unit", &said.unit),
+            ("zone", &said.zone),
+            ("order", &said.order),
+            ("clocks", &said.clocks),
+            ("set_back", &said.set_back),
+        ] {
+            push_text(&mut text, key, value.as_deref());
         }
         text
     }
 }
 
-fn column_toml(column: &ProposedColumn) -> String {
-    let to = column.to.as_deref().unwrap_or(&column.from);
-    let mut text = format!("\n[[column]]\nfrom = {}\nto = {}\n", format_toml_text(&column.from), format_toml_text(to));
-    if let Some(unit) = &column.unit {
-        let _ = writeln!(text, "unit = {}", format_toml_text(unit));
+/// What a map says of how the file is written.
+fn form_toml(base: &Mapping) -> String {
+    let mut text = String::new();
+    push_text(&mut text, "encoding", base.encoding.as_deref());
+    push_text(&mut text, "separator", base.separator.as_deref());
+    push_text(&mut text, "decimal", base.decimal.map(String::from).as_deref());
+    for (key, line) in [("header_line", base.header_line), ("units_line", base.units_line)] {
+        if let Some(line) = line {
+            let _ = writeln!(text, "{key} = {line}");
+        }
     }
+    push_text(&mut text, "sheet", base.sheet.as_deref());
+    if !base.names.is_empty() {
+        let names: Vec<String> = base.names.iter().map(|name| format_toml_text(name)).collect();
+        let _ = writeln!(text, "names = [{}]", names.join(", "));
+    }
+    text
+}
+
+fn push_text(text: &mut String, key: &str, value: Option<&str>) {
+    if let Some(value) = value {
+        let _ = writeln!(text, "{key} = {}", format_toml_text(value));
+    }
+}
+
+/// A number in full: Rust writes the shortest text that reads back as the same number, and TOML wants a point in it.
+fn push_number(text: &mut String, key: &str, value: Option<f64>) {
+    if let Some(value) = value {
+        let _ = writeln!(text, "{key} = {value:?}");
+    }
+}
+
+fn column_toml(column: &ProposedColumn, said: Option<&ColumnMapping>) -> String {
+    let to = column.to.as_deref().unwrap_or(&column.name);
+    let mut text = format!("\n[[column]]\nfrom = {}\nto = {}\n", format_toml_text(&column.from), format_toml_text(to));
+    push_text(&mut text, "unit", column.unit.as_deref().or_else(|| said?.unit.as_deref()));
+    push_number(&mut text, "scale", said.and_then(|said| said.scale));
+    push_number(&mut text, "offset", said.and_then(|said| said.offset));
     let others: Vec<&str> = column.candidates.iter().copied().filter(|candidate| *candidate != to).collect();
     if !others.is_empty() {
         let _ = writeln!(text, "# may be / 可能是: {}", others.join(", "));

@@ -51,7 +51,7 @@ pub fn read_recordings_as(sources: &[String], map: Option<&PathBuf>) -> Result<I
     for (source, one) in &read {
         warnings.extend(describe_reading(source, one));
         if let Some(text) = describe_refusals(source, one) {
-            if is_too_much(one) { problems.push(text) } else { warnings.push(text) }
+            if loses_too_much(one) { problems.push(text) } else { warnings.push(text) }
         }
     }
     if !problems.is_empty() {
@@ -106,18 +106,22 @@ pub fn describe_reading(source: &str, read: &ReadRecording) -> Vec<Bilingual> {
     lines
 }
 
+/// Is more refused than a recording may lose and still be used?
+#[must_use]
 #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
-fn is_too_much(read: &ReadRecording) -> bool {
+pub fn loses_too_much(read: &ReadRecording) -> bool {
     let refused = read.refused as f64;
     refused > REFUSED_SHARE_MAX * (refused + read.recording.count_rows() as f64)
 }
 
-fn describe_refusals(source: &str, read: &ReadRecording) -> Option<Bilingual> {
+/// Which rows were refused and why; `None` where none was.
+#[must_use]
+pub fn describe_refusals(source: &str, read: &ReadRecording) -> Option<Bilingual> {
     if read.refused == 0 {
         return None;
     }
     let all = read.refused + read.recording.count_rows() as u64;
-    let (verdict, verdict_zh) = if is_too_much(read) {
+    let (verdict, verdict_zh) = if loses_too_much(read) {
         ("more than 1 %: correct the file or record again", "超过1 %：请改正文件或重新记录")
     } else {
         ("these rows are left out, the rest is used", "这些行未使用，其余照常使用")

@@ -11,8 +11,7 @@ use super::rules::run_blocking;
 use crate::gallery;
 use adapters::bilingual::Bilingual;
 use adapters::channel::CHANNELS;
-use adapters::recording::read::preview_recording;
-use adapters::recording::read::preview_rows;
+use adapters::recording::read::{Preview, TimePreview, preview_recording, preview_rows};
 use adapters::recording::{Mapping, NoteKind, TEXT_COLUMNS};
 use axum::Json;
 use axum::body::Bytes;
@@ -21,7 +20,7 @@ use axum::response::Response;
 use axum::routing::{delete, get, post, put};
 use gateway_access::Role;
 use gateway_diagnosis::files::{BroughtFile, FileDiagnoses, FileDiagnosis};
-use gateway_diagnosis::map_file::{MapProposal, ProposedColumn};
+use gateway_diagnosis::map_file::{MapProposal, ProposedColumn, verify_proposal};
 use gateway_diagnosis::model_new::{KINDS, MATERIALS, ModelKind, NewModel};
 use rules::twin::format_toml_text;
 use serde::Deserialize;
@@ -147,12 +146,12 @@ fn build_file_document(files: &FileDiagnoses, key: &str) -> Result<Value, ApiPro
             );
         }
     };
-    let proposal = MapProposal::from_preview(&found);
+    let proposal = MapProposal::from_preview(&found, &mapping);
     let questions = proposal.open_questions();
     let column = |(index, column): (usize, &ProposedColumn)| {
         let known = found.columns.iter().find(|known| known.from == column.from);
         json!({
-            "from": column.from, "to": column.to, "unit": known.and_then(|known| known.unit.clone()), "candidates": column.candidates,
+            "from": column.from, "name": column.name, "to": column.to, "unit": known.and_then(|known| known.unit.clone()), "candidates": column.candidates,
             "is_time": column.is_time, "asked": questions.contains(&index),
         })
     };
@@ -193,6 +192,9 @@ struct ClickedMap {
     order: String,
     #[serde(default)]
     decimal: String,
+    /// Seconds from one row to the next, where no column is the time.
+    #[serde(default)]
+    step: Option<f64>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -205,29 +207,47 @@ struct ClickedColumn {
 }
 
 impl ClickedMap {
-    fn to_toml(&self) -> String {
+    /// As a map: what is not said here stays as the file was understood.
+    fn to_toml(&self, base: &Mapping, found: &TimePreview) -> String {
         let columns = self.columns.iter().map(|column| ProposedColumn {
             from: column.from.clone(),
+            name: column.from.clone(),
             to: Some(column.to.clone()),
             unit: Some(column.unit.clone()).filter(|unit| !unit.is_empty()),
             candidates: Vec::new(),
             is_time: false,
         });
-        let proposal =
-            MapProposal { columns: columns.collect(), time: Some(self.time.clone()).filter(|time| !time.is_empty()) };
-        let text = proposal.to_toml(&Bilingual::default(), "the file");
-        let mut said = String::new();
-        for (key, value) in [("zone", &self.zone), ("unit", &self.time_unit), ("order", &self.order)] {
-            if !value.is_empty() {
-                said.push_str(&format!("{key} = {}\n", format_toml_text(value)));
-            }
+        let said = |text: &String| Some(text.clone()).filter(|text| !text.is_empty());
+        let mut base = base.clone();
+        base.column.clear();
+        for (to, text) in [
+            (&mut base.time.zone, &self.zone),
+            (&mut base.time.unit, &self.time_unit),
+            (&mut base.time.order, &self.order),
+        ] {
+            *to = said(text).or(to.take());
         }
-        let text = text.replacen("[time]\n", &format!("[time]\n{said}"), 1);
-        if self.decimal.is_empty() {
-            text
-        } else {
-            text.replacen("schema = ", &format!("decimal = {}\nschema = ", format_toml_text(&self.decimal)), 1)
-        }
+        base.decimal = self.decimal.chars().next().or(base.decimal);
+        let proposal = MapProposal {
+            columns: columns.collect(),
+            time: said(&self.time),
+            step: self.step,
+            found: found.clone(),
+            base,
+        };
+        proposal.to_toml(&Bilingual::default(), "the file")
+    }
+
+    /// Every column, by the name it has and the one it gets: a person has looked at all of them.
+    fn list_names(&self, found: &Preview) -> Vec<String> {
+        let before = found.columns.iter().filter_map(|column| column.to.clone());
+        self.columns.iter().map(|column| column.to.clone()).chain(before).collect()
+    }
+
+    /// The time was said by the person who clicked.
+    fn says_time(&self) -> bool {
+        self.step.is_some()
+            || [&self.time, &self.zone, &self.time_unit, &self.order].iter().any(|text| !text.is_empty())
     }
 }
 
@@ -238,13 +258,22 @@ async fn map(
     SignedIn(_): SignedIn,
     JsonBody(clicked): JsonBody<ClickedMap>,
 ) -> Result<Response, ApiProblem> {
-    let toml = clicked.to_toml();
-    Mapping::parse(&toml, "the map")
-        .map_err(|wrong| ApiProblem::bad_request(wrong.to_string(), "change the choice that is named"))?;
     let files = shared.require_files()?.clone();
     let words = format!("file {key}: its map");
     let document = run_blocking(move || {
         let path = files.find_path(&key).ok_or_else(|| ApiProblem::not_found(&format!("a file {key:?}")))?;
+        let beside = Mapping::build_path_beside(&path);
+        let base = if beside.is_file() { Mapping::read(&beside).unwrap_or_default() } else { Mapping::default() };
+        let found = preview_recording(&path, &base).ok();
+        let time = found.as_ref().map(|found| found.time.clone()).unwrap_or_default();
+        let toml = clicked.to_toml(&base, &time);
+        let refuse = |text: String| ApiProblem::bad_request(text, "change the choice that is named");
+        Mapping::parse(&toml, "the map").map_err(|wrong| refuse(wrong.to_string()))?;
+        // Of the columns a person decides; the times stay as they are read unless something was said of them.
+        if let Some(found) = found.filter(|_| !clicked.says_time() && clicked.decimal.is_empty()) {
+            verify_proposal(&path, &toml, &found, &clicked.list_names(&found))
+                .map_err(|error| refuse(error.to_string()))?;
+        }
         files.set_map(&path, &toml).map_err(describe_io_error)?;
         build_file_document(&files, &key)
     })

@@ -1,6 +1,7 @@
 //! The second way through a table: rows become a block under the plan, and whatever is not used is counted by column and line.
 
-use super::cell::{Cell, is_absent, parse_flag, written_number};
+use super::cell::{Cell, Decimal, is_absent, parse_flag, written_number};
+use super::cell_unit::CellUnits;
 use super::convert::{
     is_nothing, join_date_and_time, moment_of_cell, number_of, show_cell, text_of, to_nanoseconds, unix_ns,
     utc_or_local,
@@ -10,10 +11,12 @@ use super::head::Head;
 use super::limits::{CELLS_MAX, DESCRIBED_MAX, WORDS_BYTES_MAX};
 use super::mapping::Mapping;
 use super::plan::{BlockPlan, Note, NoteKind, PlannedColumn, PlannedKind, ReadPlan, TimeKind};
+use super::restart::name_runs;
 use super::survey::{fit_row, is_comment, repeats_header};
 use super::table::{Table, VisitStep};
 use super::time::{RawTime, resolve_times};
 use crate::{Cells, Numbers, Recording, Words};
+use adapter_core::clock::SECOND_NS;
 
 /// Lines after the data that are taken for sums and remarks; more of them are refused rows.
 const FOOTER_MAX: usize = 12;
@@ -47,7 +50,7 @@ pub(super) fn assemble_recordings(
 ) -> Result<Assembled, RecordingError> {
     let mut done = Assembled::default();
     let mut blocks: Vec<BlockBuilder<'_>> = plan.blocks.iter().map(BlockBuilder::new).collect();
-    let short = table.may_be_short();
+    let short = table.may_be_short() || head.short;
     let (mut repeated, mut comments) = (0_u64, 0_u64);
     table.visit_rows(&mut |row| {
         if row.line < head.data_line || row.cells.iter().all(|cell| *cell == Cell::Empty) {
@@ -68,6 +71,7 @@ pub(super) fn assemble_recordings(
                 let hint = if one_more { "; a number with a decimal comma has to stand in quotes here" } else { "" };
                 let reason = format!("{} cells where the header has {}{hint}", row.cells.len(), head.names.len());
                 done.record_refusal(RowProblem { line: row.line, column: None, reason });
+                blocks.iter_mut().for_each(|block| block.rows += 1);
             }
         }
         blocks.iter().try_for_each(|block| block.within_limits(file))?;
@@ -111,6 +115,8 @@ struct ColumnBuilder<'p> {
 
 struct BlockBuilder<'p> {
     plan: &'p BlockPlan,
+    /// Rows that came by, used or not.
+    rows: u64,
     lines: Vec<u32>,
     times: Vec<RawTime>,
     columns: Vec<ColumnBuilder<'p>>,
@@ -129,6 +135,7 @@ impl<'p> BlockBuilder<'p> {
         };
         Self {
             plan,
+            rows: 0,
             lines: Vec::new(),
             times: Vec::new(),
             columns: plan.columns.iter().map(column).collect(),
@@ -139,9 +146,10 @@ impl<'p> BlockBuilder<'p> {
     /// Takes the row as a whole or not at all.
     fn accept_row(&mut self, line: u64, cells: &[Cell<'_>], done: &mut Assembled) {
         let at = |index: usize| cells.get(index).copied().unwrap_or(Cell::Empty);
-        let time = at(self.plan.time.index);
+        let has_time = self.plan.time.index.is_some_and(|index| at(index) != Cell::Empty);
+        self.rows += 1;
         // Of several clocks the shorter ones end earlier.
-        if time == Cell::Empty && self.plan.columns.iter().all(|column| at(column.index) == Cell::Empty) {
+        if !has_time && self.plan.columns.iter().all(|column| at(column.index) == Cell::Empty) {
             return;
         }
         let column = Some(self.plan.time.source.clone());
@@ -193,29 +201,30 @@ impl<'p> BlockBuilder<'p> {
     fn parse_time(&self, cells: &[Cell<'_>]) -> Result<RawTime, String> {
         let plan = &self.plan.time;
         let at = |index: usize| cells.get(index).copied().unwrap_or(Cell::Empty);
-        let cell = at(plan.index);
+        let cell = plan.index.map_or(Cell::Empty, at);
         let part_ns = plan.milliseconds.and_then(|index| number_of(at(index))).map_or(0, |ms| to_nanoseconds(ms / 1e3));
         let time = match plan.kind {
-            TimeKind::Seconds { factor, .. } => {
-                self.parse_number(cell)?.map(|number| RawTime::Seconds(number * factor))
+            TimeKind::Step { step_s, start } => Some(step_time(self.rows - 1, step_s, start)),
+            TimeKind::Seconds { decimal, factor, offset_s } => {
+                self.parse_number(cell, decimal).map(|number| RawTime::Seconds(number * factor + offset_s))
             }
-            TimeKind::Unix { factor, .. } => unix_ns(cell, factor)
-                .or(self.parse_number(cell)?.map(|number| to_nanoseconds(number * factor)))
-                .map(RawTime::Utc),
-            TimeKind::Days { .. } => {
-                self.parse_number(cell)?.map(|days| RawTime::Local(to_nanoseconds((days - 25_569.0) * 86_400.0)))
-            }
+            TimeKind::Unix { decimal, factor, epoch_s } => unix_ns(cell, factor)
+                .or_else(|| self.parse_number(cell, decimal).map(|number| to_nanoseconds(number * factor)))
+                .map(|at_ns| RawTime::Utc(at_ns.saturating_sub(epoch_s.saturating_mul(SECOND_NS)))),
+            TimeKind::Days { decimal, factor } => self
+                .parse_number(cell, decimal)
+                .map(|days| RawTime::Local(to_nanoseconds((days * factor - 25_569.0) * 86_400.0))),
             TimeKind::TimesOfDay => {
-                moment_of_cell(cell)?.and_then(|moment| moment.time_of_day_ns).map(|ns| RawTime::OfDay(ns + part_ns))
+                moment_of_cell(cell).and_then(|moment| moment.time_of_day_ns).map(|ns| RawTime::OfDay(ns + part_ns))
             }
             TimeKind::Moments { order } => match (cell, plan.date) {
                 (Cell::Instant(at_ns), _) => Some(RawTime::Utc(at_ns)),
-                (Cell::Local(at_ns), _) => Some(RawTime::Local(at_ns)),
-                (_, None) => moment_of_cell(cell)?
+                (Cell::Local(at_ns), None) => Some(RawTime::Local(at_ns)),
+                (_, None) => moment_of_cell(cell)
                     .filter(|moment| moment.date.is_some())
                     .and_then(|moment| utc_or_local(moment, order)),
                 (_, Some(date)) => {
-                    join_date_and_time(at(date), cell, order)?.map(|at_ns| RawTime::Local(at_ns + part_ns))
+                    join_date_and_time(at(date), cell, order).map(|at_ns| RawTime::Local(at_ns + part_ns))
                 }
             },
         };
@@ -227,16 +236,12 @@ impl<'p> BlockBuilder<'p> {
         })
     }
 
-    fn parse_number(&self, cell: Cell<'_>) -> Result<Option<f64>, String> {
-        let decimal = match self.plan.time.kind {
-            TimeKind::Seconds { decimal, .. } | TimeKind::Unix { decimal, .. } | TimeKind::Days { decimal } => decimal,
-            TimeKind::Moments { .. } | TimeKind::TimesOfDay => return Ok(None),
-        };
-        Ok(match cell {
+    fn parse_number(&self, cell: Cell<'_>, decimal: Decimal) -> Option<f64> {
+        match cell {
             Cell::Number(number) => Some(number),
-            Cell::Text(text) => written_number(text).and_then(|number| number.parse_value(decimal)),
+            Cell::Text(text) => parse_text_number(text, decimal, self.plan.time.cell_units.as_ref()),
             _ => None,
-        })
+        }
     }
 
     fn finish_recording(self, file: &str, mapping: &Mapping, done: &mut Assembled) -> Recording {
@@ -252,6 +257,7 @@ impl<'p> BlockBuilder<'p> {
         }
         let runs = self.columns.iter().find(|column| column.plan.name == "run").map(|column| &column.words);
         let timed = resolve_times(&self.times, runs, &mapping.time, &mut done.notes);
+        let restarts = timed.restarts;
         let mut kept = vec![true; self.times.len()];
         for (row, reason) in timed.out_of_order {
             kept[row] = false;
@@ -274,7 +280,30 @@ impl<'p> BlockBuilder<'p> {
             let cells = column.into_cells();
             recording.set_column(&name, if all { cells } else { cells.select_rows(&kept) });
         }
+        if !restarts.is_empty() {
+            let runs = name_runs(recording.find_words("run"), &restarts, &kept);
+            recording.set_column("run", Cells::Words(runs));
+            recording.forget_pauses();
+        }
         recording
+    }
+}
+
+/// A number as text under a decimal sign, in the unit of its column where its cells bring their own.
+fn parse_text_number(text: &str, decimal: Decimal, units: Option<&CellUnits>) -> Option<f64> {
+    let number = written_number(text)?;
+    let value = number.parse_value(decimal)?;
+    units.map_or(Some(value), |units| units.convert_number(value, number.suffix))
+}
+
+/// The time of a row that is counted.
+#[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
+fn step_time(row: u64, step_s: f64, start: Option<RawTime>) -> RawTime {
+    let since_s = row as f64 * step_s;
+    match start {
+        Some(RawTime::Utc(at_ns)) => RawTime::Utc(at_ns.saturating_add(to_nanoseconds(since_s))),
+        Some(RawTime::Local(at_ns)) => RawTime::Local(at_ns.saturating_add(to_nanoseconds(since_s))),
+        _ => RawTime::Seconds(since_s),
     }
 }
 
@@ -299,7 +328,7 @@ impl ColumnBuilder<'_> {
                 .or_else(|| text.parse().ok().filter(|x: &f64| x.is_finite())),
             (PlannedKind::Flags, Cell::Number(number)) => Some(number),
             (PlannedKind::Numbers { decimal, factor, offset }, Cell::Text(text)) => {
-                let value = written_number(text).and_then(|number| number.parse_value(decimal));
+                let value = parse_text_number(text, decimal, self.plan.cell_units.as_ref());
                 let value = value.or_else(|| parse_flag(text).map(|(_, yes)| f64::from(u8::from(yes))));
                 value.map(|value| value * factor + offset)
             }

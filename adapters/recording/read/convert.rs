@@ -1,6 +1,7 @@
 //! One cell as what a column wants of it: a number, a moment, text.
 
 use super::cell::{Cell, is_absent_number};
+use super::compact_moment::parse_compact;
 use super::moment::{WrittenMoment, written_moment};
 use super::time::RawTime;
 use adapter_core::clock::{SECOND_NS, TimeNs};
@@ -32,11 +33,14 @@ pub(super) fn to_nanoseconds(seconds: f64) -> i64 {
     (seconds * SECOND_NS as f64).round() as i64
 }
 
-pub(super) fn moment_of_cell(cell: Cell<'_>) -> Result<Option<WrittenMoment>, String> {
-    Ok(match cell {
-        Cell::Text(text) => written_moment(text),
+/// A moment as text, or in digits alone.
+pub(super) fn moment_of_cell(cell: Cell<'_>) -> Option<WrittenMoment> {
+    let compact = |text: &str| parse_compact(text).map(|(_, moment)| moment);
+    match cell {
+        Cell::Text(text) => written_moment(text).or_else(|| compact(text)),
+        Cell::Number(number) => compact(&number.to_string()),
         _ => None,
-    })
+    }
 }
 
 pub(super) fn utc_or_local(moment: WrittenMoment, order: super::moment::DateOrder) -> Option<RawTime> {
@@ -48,21 +52,17 @@ pub(super) fn utc_or_local(moment: WrittenMoment, order: super::moment::DateOrde
 }
 
 /// A date in one column and the time of day in another.
-pub(super) fn join_date_and_time(
-    date: Cell<'_>,
-    time: Cell<'_>,
-    order: super::moment::DateOrder,
-) -> Result<Option<TimeNs>, String> {
+pub(super) fn join_date_and_time(date: Cell<'_>, time: Cell<'_>, order: super::moment::DateOrder) -> Option<TimeNs> {
     let day_ns = match date {
         Cell::Local(at_ns) | Cell::Instant(at_ns) => Some(at_ns),
-        date => moment_of_cell(date)?.and_then(|date| WrittenMoment { time_of_day_ns: None, ..date }.local_ns(order)),
+        date => moment_of_cell(date).and_then(|date| WrittenMoment { time_of_day_ns: None, ..date }.local_ns(order)),
     };
     let of_day_ns = match time {
         Cell::Local(at_ns) => Some(at_ns.rem_euclid(86_400 * SECOND_NS)),
         Cell::Number(days) if (0.0..1.0).contains(&days) => Some(to_nanoseconds(days * 86_400.0)),
-        time => moment_of_cell(time)?.and_then(|time| time.time_of_day_ns),
+        time => moment_of_cell(time).and_then(|time| time.time_of_day_ns),
     };
-    Ok(day_ns.zip(of_day_ns).map(|(day_ns, of_day_ns)| day_ns + of_day_ns))
+    day_ns.zip(of_day_ns).map(|(day_ns, of_day_ns)| day_ns + of_day_ns)
 }
 
 pub(super) fn text_of(cell: Cell<'_>) -> String {

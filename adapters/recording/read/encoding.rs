@@ -47,27 +47,52 @@ fn guess_encoding(input: &Input) -> Result<&'static Encoding, RecordingError> {
     let mut detector = EncodingDetector::new(Iso2022JpDetection::Deny);
     let mut check = UTF_8.new_decoder_without_bom_handling();
     let mut is_utf8 = true;
+    let mut sample = Vec::new();
     let (mut chunk, mut text) = (vec![0; CHUNK], vec![0; 3 * CHUNK + 16]);
     loop {
         let length = bytes.read(&mut chunk).map_err(|error| input.build_io_error(error))?;
         let last = length == 0;
         detector.feed(&chunk[..length], last);
+        let is_foreign = |byte: &u8| !byte.is_ascii();
+        if sample.len() < CHUNK && chunk[..length].iter().any(is_foreign) {
+            sample.extend_from_slice(&chunk[..length]);
+        }
         if is_utf8 {
             let (result, ..) = check.decode_to_utf8_without_replacement(&chunk[..length], &mut text, last);
             is_utf8 = !matches!(result, DecoderResult::Malformed(..));
         }
         if last {
-            return Ok(if is_utf8 { UTF_8 } else { guess_legacy_encoding(&detector) });
+            return Ok(if is_utf8 { UTF_8 } else { guess_legacy_encoding(&detector, &sample) });
         }
     }
 }
 
-/// A few Chinese words look like Japanese or Korean ones as well; in a machine shop they are Chinese.
-fn guess_legacy_encoding(detector: &EncodingDetector) -> &'static Encoding {
+/// Signs of the field's words in Chinese and in Japanese; Japanese syllables count as well.
+const CHINESE: &str = "主轴转速进给率功电流压温度时间日期切深宽工件刀具程序冷却液备注状态力扭矩批次试验机床号数值最大小平均报警运行序倍负载位置信息正常";
+const JAPANESE: &str =
+    "主軸回転数速度送電力流圧温日付時刻間経過工具番号切込負荷平均最大小値測定加計名状態冷却油機械位置運転軸記録単試験";
+
+/// So many signs of the field are no accident: of signs read in the wrong encoding one in some hundred is among them.
+const JAPANESE_MIN: usize = 4;
+
+/// A few Chinese words look like Japanese or Korean ones as well; in a machine shop they are Chinese, unless read as Japanese they hold
+/// more of the field's signs.
+fn guess_legacy_encoding(detector: &EncodingDetector, sample: &[u8]) -> &'static Encoding {
     let first = detector.guess(None, Utf8Detection::Deny);
     let is_eastern =
         [encoding_rs::EUC_JP, encoding_rs::EUC_KR, encoding_rs::BIG5, encoding_rs::SHIFT_JIS].contains(&first);
-    if is_eastern { detector.guess(Some(b"cn"), Utf8Detection::Deny) } else { first }
+    if !is_eastern {
+        return first;
+    }
+    let chinese = detector.guess(Some(b"cn"), Utf8Detection::Deny);
+    let count = |encoding: &'static Encoding, signs: &str| {
+        let (text, _) = encoding.decode_without_bom_handling(sample);
+        text.chars()
+            .filter(|c| signs.contains(*c) || signs == JAPANESE && ('\u{3041}'..='\u{30ff}').contains(c))
+            .count()
+    };
+    let found = count(encoding_rs::SHIFT_JIS, JAPANESE);
+    if found >= JAPANESE_MIN && found > 2 * count(chinese, CHINESE) { encoding_rs::SHIFT_JIS } else { chinese }
 }
 
 /// Bytes of any encoding as UTF-8. What cannot be decoded becomes U+FFFD.
@@ -137,6 +162,13 @@ mod tests {
         let line = "Zeit;Kühlmittel;Prüfer\n0;1;Müller\n".repeat(20);
         let (latin, ..) = encoding_rs::WINDOWS_1252.encode(&line);
         assert_eq!(text_of(&latin), ("windows-1252", line));
+    }
+
+    #[test]
+    fn japanese_words_of_the_field_are_japanese() {
+        let line = "日付,時刻,電流[A],電力[kW],主軸回転速度[min-1]\n2026/03/17,08:15:00,0.9,0.3,1200\n".repeat(3);
+        let (bytes, ..) = encoding_rs::SHIFT_JIS.encode(&line);
+        assert_eq!(text_of(&bytes), ("Shift_JIS", line));
     }
 
     #[test]

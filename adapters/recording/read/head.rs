@@ -2,8 +2,11 @@
 
 use super::cell::{Cell, is_absent_number, written_number};
 use super::error::RecordingError;
+use super::head_form::{HeadForm, find_head_form, merge_group_line};
 use super::limits::HEAD_ROWS;
+use super::mapping::Mapping;
 use super::moment::written_moment;
+use super::names::ForeignName;
 use super::table::{OwnedCell, Table, VisitStep};
 use adapter_core::bilingual::Bilingual;
 use adapter_core::channel::unit::Unit;
@@ -28,19 +31,42 @@ pub(super) struct Head {
     pub(super) has_units: bool,
     /// The rows have one cell more than there are names: the first one numbers them, as R writes it.
     pub(super) numbered: bool,
+    /// The columns end at different rows, and the rows with them.
+    pub(super) short: bool,
+    /// What the head says of time.
+    pub(super) time: Option<HeadTime>,
 }
 
-type HeadRow = (u64, Vec<OwnedCell>);
+/// A column that counts samples: time is `start_s + step_s x`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct HeadTime {
+    pub(super) index: usize,
+    pub(super) start_s: f64,
+    pub(super) step_s: f64,
+}
 
-/// Lines that a map says.
+/// Line and cells.
+pub(super) type HeadRow = (u64, Vec<OwnedCell>);
+
+/// What a map says of the head.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct GivenLines {
+pub(super) struct GivenHead<'m> {
+    /// Line of the names,
     pub(super) names: Option<u64>,
+    /// of the units,
     pub(super) units: Option<u64>,
+    /// or the names themselves, where no line holds them.
+    pub(super) list: &'m [String],
+}
+
+impl<'m> GivenHead<'m> {
+    pub(super) fn from_mapping(mapping: &'m Mapping) -> Self {
+        Self { names: mapping.header_line, units: mapping.units_line, list: &mapping.names }
+    }
 }
 
 /// Looks at the first rows.
-pub(super) fn find_head(table: &dyn Table, given: GivenLines, file: &str) -> Result<Head, RecordingError> {
+pub(super) fn find_head(table: &dyn Table, given: GivenHead<'_>, file: &str) -> Result<Head, RecordingError> {
     let mut rows: Vec<HeadRow> = Vec::new();
     table.visit_rows(&mut |row| {
         let cells: Vec<OwnedCell> = row.cells.iter().map(to_owned_cell).collect();
@@ -52,6 +78,10 @@ pub(super) fn find_head(table: &dyn Table, given: GivenLines, file: &str) -> Res
     if rows.is_empty() {
         return Err(RecordingError::Empty { file: file.to_owned(), problems: Vec::new() });
     }
+    if !given.list.is_empty() {
+        return Ok(head_of_names(&rows, given));
+    }
+    let given = GivenHead { names: given.names.or_else(|| table.find_names_line()), ..given };
     let header = |line: u64, reason: Bilingual| RecordingError::Header { file: file.to_owned(), line, reason };
     // Our own names say themselves which line they are.
     let ours = rows.iter().find(|(_, cells)| {
@@ -60,7 +90,7 @@ pub(super) fn find_head(table: &dyn Table, given: GivenLines, file: &str) -> Res
     let given = match (given.names, ours) {
         (None, Some((line, _))) => {
             let next = rows.iter().find(|(at, _)| at > line).filter(|(_, cells)| is_units(cells));
-            GivenLines { names: Some(*line), units: given.units.or(next.map(|(at, _)| *at)) }
+            GivenHead { names: Some(*line), units: given.units.or(next.map(|(at, _)| *at)), ..given }
         }
         _ => given,
     };
@@ -75,6 +105,10 @@ pub(super) fn find_head(table: &dyn Table, given: GivenLines, file: &str) -> Res
         Some(line) => rows[..first].iter().position(|(at, _)| *at == line),
         None => (0..first).rev().find(|row| is_units(&rows[*row].1) && (first > 1)),
     };
+    let form = find_head_form(&rows[..first]).filter(|_| given.names.is_none());
+    if let Some(form) = form {
+        return Ok(head_of_form(form, rows.get(first).map_or(u64::MAX, |row| row.0), first));
+    }
     let names = match given.names {
         Some(line) => rows[..first].iter().position(|(at, _)| *at == line),
         None => names_row(&rows[..first], units),
@@ -83,13 +117,19 @@ pub(super) fn find_head(table: &dyn Table, given: GivenLines, file: &str) -> Res
     let width = rows[first..].first().map_or(0, |(_, cells)| cells.len());
     let mut head =
         Head { line: rows[names].0, data_line: rows.get(first).map_or(u64::MAX, |row| row.0), ..Head::default() };
-    head.names = paired_names(&rows[..first]).unwrap_or_else(|| extract_texts(&rows[names].1));
+    head.names = extract_texts(&rows[names].1);
+    let upper = names.checked_sub(1).filter(|upper| given.names.is_none() && rows[*upper].0 + 1 == rows[names].0);
+    let merged = upper.and_then(|upper| merge_group_line(&extract_texts(&rows[upper].1), &head.names));
+    let is_merged = merged.is_some();
+    head.names = merged.unwrap_or(head.names);
     strip_comment_sign(&mut head.names);
     let filled = head.names.iter().rposition(|name| !name.is_empty()).map_or(0, |last| last + 1);
     head.names.truncate(filled.max(1));
     head.numbered = rows[names].1.len() + 1 == width
         && head.names.len() + 1 == width
-        && rows[first..].iter().all(|(_, cells)| cells.len() == width);
+        && rows[first..].iter().all(|(_, cells)| cells.len() == width)
+        // Where the last cell is always empty, the rows end in a separator.
+        && rows[first..].iter().any(|(_, cells)| cells.last().is_some_and(|cell| *cell != OwnedCell::Empty));
     if head.numbered {
         head.names.insert(0, String::new());
     }
@@ -99,14 +139,48 @@ pub(super) fn find_head(table: &dyn Table, given: GivenLines, file: &str) -> Res
             extract_texts(&rows[row].1).into_iter().map(|unit| Some(unit).filter(|unit| !unit.is_empty())).collect();
     }
     head.units.resize(head.names.len(), None);
-    head.other_lines = first - 1 - usize::from(head.has_units);
+    head.other_lines = first - 1 - usize::from(head.has_units) - usize::from(is_merged);
+    head.short = has_several_clocks(&head.names);
     Ok(head)
+}
+
+/// Names that a map gives stand above the first row that looks like data.
+fn head_of_names(rows: &[HeadRow], given: GivenHead<'_>) -> Head {
+    let names = given.list.to_vec();
+    let first = match given.names {
+        Some(line) => rows.iter().position(|(at, _)| *at > line).unwrap_or(rows.len()),
+        None => first_data_row(rows),
+    };
+    let line = rows.get(first).map_or(u64::MAX, |row| row.0);
+    let short = has_several_clocks(&names);
+    Head { units: vec![None; names.len()], names, line, data_line: line, other_lines: first, short, ..Head::default() }
+}
+
+fn head_of_form(form: HeadForm, data_line: u64, lines: usize) -> Head {
+    Head {
+        other_lines: lines.saturating_sub(form.lines),
+        has_units: form.units.iter().any(Option::is_some),
+        names: form.names,
+        units: form.units,
+        line: form.line,
+        data_line,
+        numbered: false,
+        short: form.short,
+        time: form.time,
+    }
+}
+
+/// A column of time stands there more than once: columns of the slower clocks end earlier, and so do their rows.
+fn has_several_clocks(names: &[String]) -> bool {
+    let is_clock = |name: &&String| !name.is_empty() && ForeignName::from_text(name, None).is_time();
+    (1..names.len()).any(|index| names[..index].contains(&names[index]) && is_clock(&&names[index]))
 }
 
 fn no_names() -> Bilingual {
     Bilingual::new(
-        "no line names the columns before the data begin. Put one above them, or say in a map which line it is (header_line)",
-        "数据之前没有列名行。请在数据上方加一行列名，或在映射文件中指定该行（header_line）",
+        "no line names the columns before the data begin. Put one above them, or say in a map which line it is (header_line), or how they are \
+         called (names = [\"time_s\", \"spindle_speed_rpm\"])",
+        "数据之前没有列名行。请在数据上方加一行列名，或在映射文件中指定该行（header_line）或列名（names = [\"time_s\", \"spindle_speed_rpm\"]）",
     )
 }
 
@@ -121,7 +195,7 @@ fn to_owned_cell(cell: &Cell<'_>) -> OwnedCell {
     }
 }
 
-fn extract_texts(cells: &[OwnedCell]) -> Vec<String> {
+pub(super) fn extract_texts(cells: &[OwnedCell]) -> Vec<String> {
     let text = |cell: &OwnedCell| match cell {
         OwnedCell::Text(text) => text.split_whitespace().collect::<Vec<_>>().join(" "),
         OwnedCell::Number(number) => number.to_string(),
@@ -205,22 +279,6 @@ fn names_row(rows: &[HeadRow], units: Option<usize>) -> Option<usize> {
         .or(units.filter(|_| rows.len() == 1))
 }
 
-/// `Name X Name Y`, as TwinCAT writes it: every second column is the time of the one behind it, in the unit of the line below.
-fn paired_names(rows: &[HeadRow]) -> Option<Vec<String>> {
-    let is_pair = |cells: &[String]| {
-        cells.len() >= 4
-            && cells.len().is_multiple_of(2)
-            && cells.chunks(2).all(|pair| pair[0] == "Name" && !pair[1].is_empty())
-    };
-    let names = rows.iter().map(|(_, cells)| extract_texts(cells)).find(|cells| is_pair(cells))?;
-    let step = rows
-        .iter()
-        .map(|(_, cells)| extract_texts(cells))
-        .find(|cells| cells.first().is_some_and(|text| text.starts_with("SampleTime")))?;
-    let unit = step[0].trim_start_matches("SampleTime").trim_matches(['[', ']', '(', ')']).to_owned();
-    Some(names.chunks(2).flat_map(|pair| [format!("Time [{unit}]"), pair[1].clone()]).collect())
-}
-
 fn strip_comment_sign(names: &mut Vec<String>) {
     let Some(rest) = names.first().and_then(|first| first.strip_prefix('#')) else { return };
     let rest = rest.trim().to_owned();
@@ -239,7 +297,7 @@ mod tests {
 
     fn head(text: &str) -> Head {
         let table = TextTable::new(Input::from_memory(text.as_bytes().to_vec(), "t.csv"), None, None).expect("text");
-        find_head(&table, GivenLines::default(), "t.csv").expect("a head")
+        find_head(&table, GivenHead::default(), "t.csv").expect("a head")
     }
 
     #[test]
@@ -271,7 +329,7 @@ mod tests {
     #[test]
     fn data_without_names_are_refused() {
         let table = TextTable::new(Input::from_memory(b"0,1\n1,2\n2,3\n".to_vec(), "t.csv"), None, None).expect("text");
-        let error = find_head(&table, GivenLines::default(), "t.csv").expect_err("no names").to_string();
+        let error = find_head(&table, GivenHead::default(), "t.csv").expect_err("no names").to_string();
         assert!(error.contains("line 1") && error.contains("header_line"), "{error}");
     }
 }

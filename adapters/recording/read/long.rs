@@ -1,11 +1,12 @@
 //! A table with one line for each value (time, name, value), as data loggers of OPC UA write it: turned into columns, each with its own clock.
 
 use super::cell::{Cell, is_absent};
+use super::convert::text_of;
 use super::error::RecordingError;
 use super::head::Head;
 use super::limits::{CELLS_IN_MEMORY_MAX, COLUMNS_MAX};
-use super::names::squeeze_name;
-use super::survey::{Survey, fit_row};
+use super::names::{ForeignName, squeeze_name};
+use super::survey::{Survey, fit_row, is_comment, repeats_header};
 use super::table::{ColumnCells, ColumnTable, OwnedCell, Table, VisitStep};
 use adapter_core::bilingual::Bilingual;
 use std::collections::HashMap;
@@ -13,6 +14,8 @@ use std::collections::HashMap;
 const NAME: &[&str] = &[
     "name",
     "displayname",
+    "varname",
+    "field",
     "tag",
     "tagname",
     "variable",
@@ -31,7 +34,7 @@ const NAME: &[&str] = &[
     "信号",
     "通道",
 ];
-const VALUE: &[&str] = &["value", "wert", "messwert", "数值", "值", "测量值"];
+const VALUE: &[&str] = &["value", "varvalue", "wert", "messwert", "数值", "值", "测量值"];
 
 /// The table turned; `None` where it is none of this kind.
 pub(super) fn turn_table(
@@ -42,30 +45,37 @@ pub(super) fn turn_table(
 ) -> Result<Option<ColumnTable>, RecordingError> {
     let position = |known: &[&str]| head.names.iter().position(|name| known.contains(&squeeze_name(name).as_str()));
     let (Some(name), Some(value)) = (position(NAME), position(VALUE)) else { return Ok(None) };
-    let is_word = survey.columns[name].words * 2 > survey.columns[name].count_filled();
-    let moments = |index: usize| {
-        let column = &survey.columns[index];
-        column.moments + column.instants + column.locals + column.count_numbers()
+    // A name may look like a flag: `n`, `on`.
+    let words = survey.columns[name].words + survey.columns[name].flags;
+    let is_word = words * 2 > survey.columns[name].count_filled();
+    let is_time =
+        |index: &usize| ![name, value].contains(index) && ForeignName::from_text(&head.names[*index], None).is_time();
+    let moments = |index: &usize| {
+        let column = &survey.columns[*index];
+        column.moments + column.instants + column.locals > 0
     };
-    let time = (0..head.names.len()).find(|index| {
-        ![name, value].contains(index)
-            && super::names::ForeignName::from_text(&head.names[*index], None).is_time()
-            && moments(*index) > 0
-    });
+    let all = || (0..head.names.len()).filter(is_time);
+    let time = all().find(moments).or_else(|| all().find(|index| survey.columns[*index].count_numbers() > 0));
     let Some(time) = time.filter(|_| is_word) else { return Ok(None) };
-    let mut series: Vec<(String, Vec<OwnedCell>, Vec<OwnedCell>)> = Vec::new();
-    let mut known: HashMap<String, usize> = HashMap::new();
+    // InfluxDB numbers its tables: a field stands in several where a tag differs.
+    let table_number = head.names.iter().position(|name| name == "table");
+    let mut series: Vec<Series> = Vec::new();
+    let mut known: HashMap<(String, String), usize> = HashMap::new();
     let mut cells = 0;
     table.visit_rows(&mut |row| {
-        let Some(found) = fit_row(row, head, true).filter(|_| row.line >= head.data_line) else { return Ok(VisitStep::Next) };
+        if row.line < head.data_line || is_comment(row, head) || repeats_header(row, head) {
+            return Ok(VisitStep::Next);
+        }
+        let Some(found) = fit_row(row, head, true) else { return Ok(VisitStep::Next) };
         let at = |index: usize| found.get(index).copied().unwrap_or(Cell::Empty);
         let Cell::Text(text) = at(name) else { return Ok(VisitStep::Next) };
-        let place = *known.entry(text.to_owned()).or_insert_with(|| {
-            series.push((text.to_owned(), Vec::new(), Vec::new()));
+        let part = table_number.map_or_else(String::new, |index| text_of(at(index)));
+        let place = *known.entry((text.to_owned(), part.clone())).or_insert_with(|| {
+            series.push(Series { name: text.to_owned(), part, times: Vec::new(), values: Vec::new() });
             series.len() - 1
         });
-        series[place].1.push(to_owned_cell(at(time)));
-        series[place].2.push(to_owned_cell(at(value)));
+        series[place].times.push(to_owned_cell(at(time)));
+        series[place].values.push(to_owned_cell(at(value)));
         cells += 2;
         if cells > CELLS_IN_MEMORY_MAX || series.len() > COLUMNS_MAX {
             let en = format!("more than {CELLS_IN_MEMORY_MAX} values or {COLUMNS_MAX} names, one line for each: export them as columns");
@@ -76,13 +86,26 @@ pub(super) fn turn_table(
     let label = head.names[time].clone();
     let mut form = table.describe_form();
     form.push(Bilingual::new("one line for each value, turned into columns", "每行一个值，已转换为列"));
+    let repeats: Vec<bool> =
+        series.iter().map(|one| series.iter().filter(|other| other.name == one.name).count() > 1).collect();
     let columns = series
         .into_iter()
-        .flat_map(|(name, times, values)| {
-            [(label.clone(), ColumnCells::Cells(times)), (name, ColumnCells::Cells(values))]
+        .zip(repeats)
+        .flat_map(|(series, repeats)| {
+            let name = if repeats { format!("{} table {}", series.name, series.part) } else { series.name };
+            [(label.clone(), ColumnCells::Cells(series.times)), (name, ColumnCells::Cells(series.values))]
         })
         .collect();
-    Ok(Some(ColumnTable { columns, form }))
+    Ok(Some(ColumnTable { columns, form, notes: table.list_notes() }))
+}
+
+/// The values of one name.
+struct Series {
+    name: String,
+    /// The table in which they stand, where the file numbers them.
+    part: String,
+    times: Vec<OwnedCell>,
+    values: Vec<OwnedCell>,
 }
 
 fn to_owned_cell(cell: Cell<'_>) -> OwnedCell {

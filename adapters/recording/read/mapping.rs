@@ -1,5 +1,6 @@
 //! The map of a foreign file (`map/1`): how it is written, and which of its columns is which of ours. Whatever it says is not guessed.
 
+use super::moment::{WrittenDate, written_moment};
 use super::text::Separator;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -21,6 +22,9 @@ pub struct Mapping {
     pub header_line: Option<u64>,
     /// Line of the units.
     pub units_line: Option<u64>,
+    /// The names of the columns, for a file that has no line of names.
+    #[serde(default)]
+    pub names: Vec<String>,
     /// The sheet of a workbook, the group of a TDMS file, the variable of a MAT file.
     pub sheet: Option<String>,
     /// What is said about time.
@@ -29,15 +33,26 @@ pub struct Mapping {
     /// What is said about single columns.
     #[serde(default)]
     pub column: Vec<ColumnMapping>,
+    /// Columns that have a time of their own.
+    #[serde(default)]
+    pub clock: Vec<ClockMapping>,
 }
 
 /// What a map says about time.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TimeMapping {
-    /// The column of time, by its name in the file.
+    /// The column of time, by its name in the file or `#3`.
     pub column: Option<String>,
-    /// `s`, `ms`, ..., `excel` (days since 1900), `unix` (seconds since 1970).
+    /// The column of the date, where the time of day stands in another one,
+    pub date: Option<String>,
+    /// which is this one.
+    pub clock: Option<String>,
+    /// Seconds from one row to the next, where there is no column of time.
+    pub step: Option<f64>,
+    /// When the first row was, where there is no column of time: `2026-03-17T08:15:00`, with or without a zone.
+    pub start: Option<String>,
+    /// `s`, `ms`, ..., `excel` (days since 1900), `unix` (seconds since 1970), `labview` (seconds since 1904).
     pub unit: Option<String>,
     /// The clock on the wall, such as `Europe/Berlin`; for times that do not say it.
     pub zone: Option<String>,
@@ -46,8 +61,21 @@ pub struct TimeMapping {
     /// `times`: each time column is a clock of its own, and the values are brought together by them (default). `rows`: what
     /// stands in a row was measured together, whatever the further time columns say.
     pub clocks: Option<String>,
-    /// `refuse` (default) or `join`: where the clock was set back, what comes after follows one period later.
+    /// `refuse` (default), `join` or `run`. Where time goes back, with `join` what comes after follows one period later; with `run`
+    /// a new run begins there.
     pub set_back: Option<String>,
+}
+
+/// Columns that have a time of their own in one file.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClockMapping {
+    /// The columns, by their names in the file or `#3`.
+    pub columns: Vec<String>,
+    /// Their column of time,
+    pub time: Option<String>,
+    /// or the seconds from one row to the next.
+    pub step: Option<f64>,
 }
 
 /// One column of the file.
@@ -97,7 +125,7 @@ impl Mapping {
         for (name, value, known) in [
             ("order", &mapping.time.order, &["dmy", "mdy"][..]),
             ("clocks", &mapping.time.clocks, &["times", "rows"]),
-            ("set_back", &mapping.time.set_back, &["refuse", "join"]),
+            ("set_back", &mapping.time.set_back, &["refuse", "join", "run"]),
         ] {
             if let Some(value) = value.as_deref().filter(|value| !known.contains(value)) {
                 return Err(wrong(format!("[time] {name} = {value:?}: it is {}", known.join(" or "))));
@@ -115,6 +143,7 @@ impl Mapping {
                 "[time] zone = {zone:?} is not known; write Europe/Berlin, Asia/Shanghai, UTC or such"
             )));
         }
+        mapping.check_time().map_err(wrong)?;
         for (index, column) in mapping.column.iter().enumerate() {
             if mapping.column[..index].iter().any(|other| other.from == column.from) {
                 return Err(wrong(format!("[[column]] from = {:?} stands twice", column.from)));
@@ -132,6 +161,38 @@ impl Mapping {
             }
         }
         Ok(mapping)
+    }
+
+    /// What contradicts itself in what is said of time.
+    fn check_time(&self) -> Result<(), String> {
+        let time = &self.time;
+        if time.date.is_some() != time.clock.is_some() || time.clock.is_some() && time.column.is_some() {
+            return Err("[time] date and clock stand together, and without column".to_owned());
+        }
+        if time.step.is_some() && (time.column.is_some() || time.clock.is_some()) {
+            return Err(
+                "[time] step is for a file without a column of time: leave column, date and clock out".to_owned()
+            );
+        }
+        if let Some(start) = time.start.as_deref() {
+            if time.step.is_none() {
+                return Err("[time] start goes with step, for a file without a column of time".to_owned());
+            }
+            if written_moment(start).is_none_or(|moment| !matches!(moment.date, Some(WrittenDate::YearFirst(..)))) {
+                return Err(format!("[time] start = {start:?}: write it as 2026-03-17T08:15:00"));
+            }
+        }
+        let is_step = |step: &f64| step.is_finite() && *step > 0.0;
+        if time.step.iter().chain(self.clock.iter().filter_map(|clock| clock.step.as_ref())).any(|step| !is_step(step))
+        {
+            return Err("step: seconds from one row to the next, greater than 0".to_owned());
+        }
+        for clock in &self.clock {
+            if clock.time.is_some() == clock.step.is_some() || clock.columns.is_empty() {
+                return Err("[[clock]] has columns, and either time or step".to_owned());
+            }
+        }
+        Ok(())
     }
 
     /// Reads a map from its file.
@@ -181,6 +242,10 @@ mod tests {
                 "two columns",
             ),
             ("schema = \"map/1\"\nseperator = \",\"", "seperator"),
+            ("schema = \"map/1\"\n[time]\nstep = 0", "step"),
+            ("schema = \"map/1\"\n[time]\ndate = \"Datum\"", "stand together"),
+            ("schema = \"map/1\"\n[time]\nstart = \"2026-03-17T08:15:00\"", "goes with step"),
+            ("schema = \"map/1\"\n[[clock]]\ncolumns = [\"a\"]", "either time or step"),
         ] {
             let error = Mapping::parse(wrong, "m").expect_err("wrong").to_string();
             assert!(error.contains(word), "{error}");

@@ -9,20 +9,25 @@
 //! |---|---|
 //! | `input`, `encoding`, `text` | bytes, characters, rows of cells |
 //! | `formats` | workbooks, LabVIEW, MATLAB, MTConnect, Parquet as the same rows of cells |
-//! | `head` | where the data begin, which line names the columns, which holds units |
-//! | `cell`, `moment` | what one cell may be |
-//! | `survey`, `understand`, `clock`, `names` | what a column is |
-//! | `assemble`, `time`, `merge` | rows, time, several clocks in one file |
+//! | `head`, `head_form` | where the data begin, which line names the columns, which holds units; heads of known programs |
+//! | `long` | one line for each value, turned into columns |
+//! | `cell`, `cell_unit`, `moment`, `compact_moment` | what one cell may be |
+//! | `survey`, `understand`, `targets`, `clock`, `numeric_time`, `names` | what a column is |
+//! | `assemble`, `time`, `restart`, `merge` | rows, time, tests one after the other, several clocks in one file |
+//! | `preview` | how a file is understood, for a person and for a map |
 //! | `limits` | how much is taken at most |
 
 mod assemble;
 pub mod cell;
+mod cell_unit;
 mod clock;
+mod compact_moment;
 mod convert;
 pub(super) mod encoding;
 pub(super) mod error;
 mod formats;
 mod head;
+mod head_form;
 pub(super) mod input;
 pub(super) mod limits;
 mod long;
@@ -30,8 +35,10 @@ pub(super) mod mapping;
 mod merge;
 mod moment;
 pub mod names;
+mod numeric_time;
 pub(super) mod plan;
 mod preview;
+mod restart;
 mod splitter;
 mod survey;
 pub(super) mod table;
@@ -41,7 +48,7 @@ mod time;
 mod understand;
 
 pub use error::{RecordingError, RowProblem};
-pub use preview::{ColumnPreview, Preview, preview_recording, preview_rows};
+pub use preview::{ColumnPreview, Preview, TimePreview, find_difference, preview_recording, preview_rows};
 
 use super::Recording;
 
@@ -117,13 +124,47 @@ pub fn read_csv(mut input: impl Read, file: &str) -> Result<ReadRecording, Recor
 
 fn read_input(input: Input, mapping: &Mapping) -> Result<ReadRecording, RecordingError> {
     let file = input.file.clone();
+    let understood = understand_input(input, mapping)?;
+    read_understood(&understood, mapping, &file)
+}
+
+/// A table and how it is to be read.
+struct UnderstoodTable {
+    table: Box<dyn Table>,
+    head: head::Head,
+    plan: Result<ReadPlan, RecordingError>,
+}
+
+/// Head and plan of a file; a table that has a line for each value is turned first.
+fn understand_input(input: Input, mapping: &Mapping) -> Result<UnderstoodTable, RecordingError> {
+    let file = input.file.clone();
     let table = formats::open_table(input, mapping)?;
-    let (head, plan, table) = plan_table(table, mapping, &file)?;
-    let mut done = assemble::assemble_recordings(table.as_ref(), &head, &plan, mapping, &file)?;
+    let head = head::find_head(table.as_ref(), head::GivenHead::from_mapping(mapping), &file)?;
+    let survey = survey::survey_table(table.as_ref(), &head)?;
+    if let Some(turned) = long::turn_table(table.as_ref(), &head, &survey, &file)? {
+        let head = head::find_head(&turned, head::GivenHead::default(), &file)?;
+        let survey = survey::survey_table(&turned, &head)?;
+        let plan = understand::build_plan(&head, &survey, mapping, &file);
+        return Ok(UnderstoodTable { table: Box::new(turned), head, plan });
+    }
+    let plan = understand::build_plan(&head, &survey, mapping, &file);
+    Ok(UnderstoodTable { table, head, plan })
+}
+
+/// Rows and notes of a table under its plan.
+fn read_understood(
+    understood: &UnderstoodTable,
+    mapping: &Mapping,
+    file: &str,
+) -> Result<ReadRecording, RecordingError> {
+    let UnderstoodTable { table, head, plan } = understood;
+    let plan = plan.as_ref().map_err(RecordingError::repeat)?;
+    let mut done = assemble::assemble_recordings(table.as_ref(), head, plan, mapping, file)?;
     let together = mapping.time.clocks.as_deref() == Some("rows");
     let mut notes: Vec<Note> =
         table.describe_form().into_iter().map(|text| Note { kind: NoteKind::Assumption, text }).collect();
-    notes.extend(plan.notes);
+    notes.extend(table.list_notes());
+    notes.extend(plan.notes.iter().cloned());
     let recording = merge::merge_blocks(std::mem::take(&mut done.blocks), together, &mut done.notes);
     notes.extend(done.notes);
     // The same of every clock of the file is said once.
@@ -134,28 +175,9 @@ fn read_input(input: Input, mapping: &Mapping) -> Result<ReadRecording, Recordin
         }
     }
     if recording.count_rows() == 0 {
-        return Err(RecordingError::Empty { file, problems: done.problems });
+        return Err(RecordingError::Empty { file: file.to_owned(), problems: done.problems });
     }
     Ok(ReadRecording { recording, problems: done.problems, refused: done.refused, notes: said })
-}
-
-/// Head and plan of a table; one that has a line for each value is turned first.
-fn plan_table(
-    table: Box<dyn Table>,
-    mapping: &Mapping,
-    file: &str,
-) -> Result<(head::Head, ReadPlan, Box<dyn Table>), RecordingError> {
-    let given = head::GivenLines { names: mapping.header_line, units: mapping.units_line };
-    let head = head::find_head(table.as_ref(), given, file)?;
-    let survey = survey::survey_table(table.as_ref(), &head)?;
-    if let Some(turned) = long::turn_table(table.as_ref(), &head, &survey, file)? {
-        let head = head::find_head(&turned, head::GivenLines::default(), file)?;
-        let survey = survey::survey_table(&turned, &head)?;
-        let plan = understand::build_plan(&head, &survey, mapping, file)?;
-        return Ok((head, plan, Box::new(turned)));
-    }
-    let plan = understand::build_plan(&head, &survey, mapping, file)?;
-    Ok((head, plan, table))
 }
 
 #[cfg(test)]

@@ -62,11 +62,20 @@ impl Scanner<'_> {
 /// Takes a text as a moment.
 #[must_use]
 pub(crate) fn written_moment(text: &str) -> Option<WrittenMoment> {
-    let text = text.trim_start_matches('\'');
-    if text.len() < 5 || text.len() > 48 || !text.starts_with(|c: char| c.is_ascii_digit()) {
+    let text = text.trim_start_matches('\'').trim_matches('"');
+    if text.len() < 5 || text.len() > 48 {
         return None;
     }
     let mut scanner = Scanner { rest: text };
+    let is_half = HALVES.iter().any(|half| text.starts_with(half));
+    if !text.starts_with(|c: char| c.is_ascii_digit()) && !is_half {
+        // Mar 17, 2026 08:15:00
+        take_month(text)?;
+    }
+    if let Some(duration) = parse_days(&mut scanner) {
+        return Some(duration);
+    }
+    scanner.rest = text;
     let date = parse_date(&mut scanner);
     if date.is_none() {
         scanner.rest = text;
@@ -82,7 +91,75 @@ pub(crate) fn written_moment(text: &str) -> Option<WrittenMoment> {
     scanner.rest.is_empty().then_some(WrittenMoment { date, time_of_day_ns, offset_s })
 }
 
+/// Halves of the day, each first one before noon.
+const HALVES: [&str; 12] = ["AM", "PM", "am", "pm", "a.m.", "p.m.", "上午", "下午", "午前", "午後", "오전", "오후"];
+/// The first letters of months in English and German, with the number of each.
+const MONTHS: [(&str, i8); 16] = [
+    ("jan", 1),
+    ("feb", 2),
+    ("mar", 3),
+    ("mär", 3),
+    ("mrz", 3),
+    ("apr", 4),
+    ("may", 5),
+    ("mai", 5),
+    ("jun", 6),
+    ("jul", 7),
+    ("aug", 8),
+    ("sep", 9),
+    ("oct", 10),
+    ("okt", 10),
+    ("nov", 11),
+    ("dec", 12),
+];
+
+/// The month at the beginning of a text, and what follows its letters.
+fn take_month(text: &str) -> Option<(i8, &str)> {
+    let end = text.find(|c: char| !c.is_alphabetic()).unwrap_or(text.len());
+    let word = text[..end].to_lowercase();
+    let known = MONTHS.iter().find(|(start, _)| word.starts_with(start)).map(|(_, month)| *month);
+    let month = known.or_else(|| word.starts_with("dez").then_some(12))?;
+    Some((month, text[end..].trim_start_matches('.')))
+}
+
+/// `0 days 00:00:01.5`, as pandas writes durations.
+fn parse_days(scanner: &mut Scanner<'_>) -> Option<WrittenMoment> {
+    let (days, _) = scanner.take_number(5)?;
+    scanner.take_any(&[" days ", " day "])?;
+    let ns = days.checked_mul(86_400 * SECOND_NS)?.checked_add(time_of_day(scanner)?)?;
+    scanner.rest.is_empty().then_some(WrittenMoment { date: None, time_of_day_ns: Some(ns), offset_s: None })
+}
+
+/// `17-Mar-2026`, `17 March 2026`, `Mar 17, 2026`.
+fn parse_named_date(text: &str) -> Option<(WrittenDate, &str)> {
+    let mut scanner = Scanner { rest: text };
+    let between = ["-", " ", ". ", ".", "/"];
+    let (day, month) = match take_month(text) {
+        Some((month, rest)) => {
+            scanner.rest = rest.trim_start();
+            let (day, _) = scanner.take_number(2)?;
+            scanner.take_any(&[", ", " "])?;
+            (day, month)
+        }
+        None => {
+            let (day, _) = scanner.take_number(2)?;
+            scanner.take_any(&between)?;
+            let (month, rest) = take_month(scanner.rest)?;
+            scanner.rest = rest;
+            scanner.take_any(&between)?;
+            (day, month)
+        }
+    };
+    let (year, 4) = scanner.take_number(4)? else { return None };
+    let date = WrittenDate::YearFirst(i16::try_from(year).ok()?, month, i8::try_from(day).ok()?);
+    Some((date, scanner.rest))
+}
+
 fn parse_date(scanner: &mut Scanner<'_>) -> Option<WrittenDate> {
+    if let Some((date, rest)) = parse_named_date(scanner.rest) {
+        scanner.rest = rest;
+        return Some(date);
+    }
     let (first, digits) = scanner.take_number(4)?;
     let sign = scanner.take_any(&["-", "/", ".", "年"])?;
     let (second, _) = scanner.take_number(2)?;
@@ -103,6 +180,8 @@ fn parse_date(scanner: &mut Scanner<'_>) -> Option<WrittenDate> {
 }
 
 fn time_of_day(scanner: &mut Scanner<'_>) -> Option<i64> {
+    let before = scanner.take_any(&HALVES);
+    scanner.skip_spaces();
     let (hour, _) = scanner.take_number(2)?;
     let sign = scanner.take_any(&[":", "时", "h"])?;
     let (minute, _) = scanner.take_number(2)?;
@@ -126,7 +205,7 @@ fn time_of_day(scanner: &mut Scanner<'_>) -> Option<i64> {
         let _unit = scanner.take_any(&["秒", "s"]);
     }
     scanner.skip_spaces();
-    let half = scanner.take_any(&["AM", "PM", "am", "pm", "上午", "下午"]);
+    let half = before.or_else(|| scanner.take_any(&HALVES));
     let hour = match half {
         Some(index) if index % 2 == 0 => hour % 12,
         Some(_) => hour % 12 + 12,
@@ -233,12 +312,26 @@ mod tests {
             "26.11.26 14:03:01,250",
             "26/11/2026 02:03:01.250 PM",
             "'26-11-2026 14:03:01.250",
+            "26-Nov-2026 14:03:01.250",
+            "26 November 2026 14:03:01.250",
+            "Nov 26, 2026 2:03:01.250 PM",
+            "2026/11/26 下午 2:03:01.250",
+            "2026/11/26 下午02:03:01.250",
+            "2026/11/26 2:03:01.250 p.m.",
+            "\"2026-11-26T14:03:01.25\"",
         ] {
             assert_eq!(local(text, DateOrder::DayFirst).as_deref(), Some("2026-11-26T14:03:01.25Z"), "{text}");
         }
         assert_eq!(local("2026年11月26日 14时03分01秒", DateOrder::DayFirst).as_deref(), Some("2026-11-26T14:03:01Z"));
         assert_eq!(local("11/26/2026 2:03:01 PM", DateOrder::MonthFirst).as_deref(), Some("2026-11-26T14:03:01Z"));
         assert_eq!(local("11/26/2026 2:03:01 PM", DateOrder::DayFirst), None);
+    }
+
+    #[test]
+    fn a_duration_in_days_is_a_time_without_a_date() {
+        let ns = |text: &str| written_moment(text).map(|moment| (moment.date.is_some(), moment.time_of_day_ns));
+        assert_eq!(ns("0 days 00:00:01.5"), Some((false, Some(1_500_000_000))));
+        assert_eq!(ns("1 days 00:00:01"), Some((false, Some(86_401_000_000_000))));
     }
 
     #[test]

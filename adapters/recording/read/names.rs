@@ -8,7 +8,7 @@ type WordRow = (&'static str, &'static [&'static str]);
 
 #[rustfmt::skip]
 const DICTIONARY: &[WordRow] = &[
-    ("spindle_speed_rpm", &["spindlespeed", "spindelspeed", "spindlerpm", "speed", "drehzahl", "spindeldrehzahl", "hauptspindeldrehzahl", "n", "rpm", "rotationalspeed", "rotaryvelocity", "spindlevelocity", "主轴转速", "转速", "主轴速度", "nckservodataactvelmot"]),
+    ("spindle_speed_rpm", &["spindlespeed", "spindelspeed", "spindlerpm", "speed", "drehzahl", "spindeldrehzahl", "hauptspindeldrehzahl", "n", "rpm", "rotationalspeed", "rotaryvelocity", "spindlevelocity", "主轴转速", "转速", "主轴速度", "主軸回転速度", "主軸回転数", "nckservodataactvelmot"]),
     ("spindle_programmed_rpm", &["programmedspindlespeed", "programmedspeed", "commandedspindlespeed", "commandedspeed", "solldrehzahl", "编程转速", "主轴编程转速", "指令转速", "主轴指令转速"]),
     ("feed_mm_min", &["feed", "feedrate", "pathfeedrate", "pathfeed", "vorschub", "vorschubgeschwindigkeit", "bahnvorschub", "bahngeschwindigkeit", "vf", "进给", "进给速度", "进给率"]),
     ("feed_programmed_mm_min", &["programmedfeed", "commandedfeed", "programmedfeedrate", "sollvorschub", "编程进给", "编程进给速度", "指令进给"]),
@@ -58,10 +58,10 @@ const DICTIONARY: &[WordRow] = &[
 /// Names that mean one of several columns: a person has to say which.
 #[rustfmt::skip]
 const UNSURE: &[WordRow] = &[
-    ("spindle_power_w", &["power", "activepower", "wattage", "leistung", "wirkleistung", "p", "p1", "pavg", "功率", "有功功率"]),
-    ("total_power_w", &["power", "activepower", "wattage", "leistung", "wirkleistung", "p", "p1", "ptotal", "psum", "pavg", "功率", "有功功率"]),
-    ("spindle_current_a", &["current", "strom", "i", "irms1", "i1", "电流"]),
-    ("axis_current_a", &["current", "strom", "i", "irms1", "i1", "电流"]),
+    ("spindle_power_w", &["power", "activepower", "wattage", "leistung", "wirkleistung", "p", "p1", "pavg", "功率", "有功功率", "電力"]),
+    ("total_power_w", &["power", "activepower", "wattage", "leistung", "wirkleistung", "p", "p1", "ptotal", "psum", "pavg", "功率", "有功功率", "電力"]),
+    ("spindle_current_a", &["current", "strom", "i", "irms1", "i1", "电流", "電流"]),
+    ("axis_current_a", &["current", "strom", "i", "irms1", "i1", "电流", "電流"]),
     ("supply_voltage_v", &["voltage", "spannung", "u", "urms1", "u1", "电压"]),
     ("spindle_load_pct", &["load", "last", "auslastung", "负载", "负荷", "tcmd"]),
     ("motor_temperature_c", &["temperature", "temperatur", "温度"]),
@@ -70,48 +70,15 @@ const UNSURE: &[WordRow] = &[
     ("teeth", &["z"]),
 ];
 
+#[rustfmt::skip]
 const TIME: &[&str] = &[
-    "time",
-    "zeit",
-    "t",
-    "timestamp",
-    "zeitstempel",
-    "datetime",
-    "dateandtime",
-    "datumzeit",
-    "datumuhrzeit",
-    "datumundzeit",
-    "date",
-    "datum",
-    "uhrzeit",
-    "xvalue",
-    "elapsedtime",
-    "elapsed",
-    "etime",
-    "timesincepoweron",
-    "sampletime",
-    "index",
-    "utc",
-    "时间",
-    "时间戳",
-    "日期时间",
-    "采样时间",
-    "日期",
-    "时刻",
-    "测量时间",
-    "localtime",
-    "logtime",
-    "messzeit",
-    "zeitpunkt",
-    "acquisitiontime",
-    "timeindex",
-    "sourcetimestamp",
-    "servertimestamp",
-    "recordtime",
-    "记录时间",
-    "times",
+    "time", "zeit", "t", "timestamp", "zeitstempel", "datetime", "dateandtime", "datumzeit", "datumuhrzeit", "datumundzeit",
+    "date", "datum", "uhrzeit", "xvalue", "elapsedtime", "elapsed", "etime", "timesincepoweron", "sampletime", "index",
+    "utc", "时间", "时间戳", "日期时间", "采样时间", "日期", "时刻", "测量时间", "localtime", "logtime",
+    "messzeit", "zeitpunkt", "acquisitiontime", "timeindex", "sourcetimestamp", "servertimestamp", "recordtime", "记录时间", "times", "timestring",
+    "時刻", "時間", "日時", "日付",
 ];
-const DATE: &[&str] = &["date", "datum", "日期"];
+const DATE: &[&str] = &["date", "datum", "日期", "日付"];
 /// Left out of a name before it is looked up.
 const NOISE: &[&str] = &[
     "actual",

@@ -1,28 +1,41 @@
 //! How a file is understood, before anything is done with it: each column with what it becomes, what else it may be, and its first values.
 
 use super::error::RecordingError;
-use super::formats;
-use super::head::{self, GivenLines};
 use super::input::Input;
 use super::mapping::Mapping;
 use super::names::ForeignName;
-use super::{ReadRecording, read_input};
-use crate::{Cells, Recording};
+use super::plan::TimePlan;
+use super::{ReadRecording, read_understood, understand_input};
+use crate::{Cells, Column, Recording};
+use adapter_core::bilingual::Bilingual;
 use std::path::Path;
 
 /// One column of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColumnPreview {
-    /// Its name in the file.
+    /// How a map names it: its name in the file, or `#3` where it has none or stands there more than once.
     pub from: String,
+    /// Its name in the file.
+    pub name: String,
     /// Its unit there, where the file says one.
     pub unit: Option<String>,
     /// Its name in the recording, where it is part of it.
     pub to: Option<String>,
     /// Columns of ours that it may be, the likeliest first.
     pub candidates: Vec<&'static str>,
-    /// It holds the time.
+    /// It holds the time, or a part of it.
     pub is_time: bool,
+}
+
+/// Where the time of a file was found, as a map says it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TimePreview {
+    /// The column of time,
+    pub column: Option<String>,
+    /// or that of the date
+    pub date: Option<String>,
+    /// and that of the time of day.
+    pub clock: Option<String>,
 }
 
 /// How a file is understood.
@@ -30,6 +43,8 @@ pub struct ColumnPreview {
 pub struct Preview {
     /// The columns in the order of the file.
     pub columns: Vec<ColumnPreview>,
+    /// Where the time is.
+    pub time: TimePreview,
     /// The file as read, or why it cannot be.
     pub read: Result<ReadRecording, RecordingError>,
 }
@@ -41,44 +56,85 @@ pub struct Preview {
 pub fn preview_recording(path: &Path, mapping: &Mapping) -> Result<Preview, RecordingError> {
     let input = Input::from_path(path);
     let file = input.file.clone();
-    let table = formats::open_table(input.clone(), mapping)?;
-    let head =
-        head::find_head(table.as_ref(), GivenLines { names: mapping.header_line, units: mapping.units_line }, &file)?;
-    let read = read_input(input, mapping);
-    let recording = read.as_ref().ok().map(|read| &read.recording);
-    let columns = head
-        .names
-        .iter()
-        .zip(&head.units)
-        .enumerate()
-        .map(|(index, (text, unit))| {
-            let name = ForeignName::from_text(text, unit.as_deref());
-            let mapped = mapping.find_column(text, index);
-            let to = match mapped {
-                Some(mapped) => Some(mapped.to.clone()).filter(|to| !to.is_empty()),
-                None => find_target_column(&name, recording),
-            };
-            let is_time = mapping.time.column.as_ref().map_or(to.is_none() && name.is_time(), |column| column == text);
+    let understood = understand_input(input, mapping)?;
+    let read = read_understood(&understood, mapping, &file);
+    let blocks = understood.plan.as_ref().map_or(&[][..], |plan| &plan.blocks);
+    let names = &understood.head.names;
+    let columns = (0..names.len())
+        .map(|index| {
+            let name = ForeignName::from_text(&names[index], understood.head.units[index].as_deref());
+            let planned = blocks.iter().flat_map(|block| &block.columns).find(|column| column.index == index);
+            let is_time = blocks.iter().any(|block| block.time.uses_column(index));
             ColumnPreview {
-                from: name.text.clone(),
+                from: name_for_map(names, index, is_time),
+                name: name.text.clone(),
                 unit: name.unit.clone(),
-                to,
+                to: planned.map(|column| column.name.clone()),
                 candidates: name.list_candidates(),
                 is_time,
             }
         })
         .collect();
-    Ok(Preview { columns, read })
+    let time = blocks.first().map_or_else(TimePreview::default, |block| preview_time(names, &block.time));
+    Ok(Preview { columns, time, read })
 }
 
-/// The column of the recording that a name has become.
-fn find_target_column(name: &ForeignName, recording: Option<&Recording>) -> Option<String> {
-    let recording = recording?;
-    let has = |name: &str| recording.columns().iter().any(|column| column.name == name);
-    if has(&name.text) {
-        return Some(name.text.clone());
+/// A name that stands there once says which column is meant; a column of time that is repeated is a clock of its own each time.
+fn name_for_map(names: &[String], index: usize, is_time: bool) -> String {
+    let stands_again = names.iter().filter(|name| **name == names[index]).count() > 1;
+    let is_first = names.iter().position(|name| *name == names[index]) == Some(index);
+    let is_plain = !names[index].is_empty() && (!stands_again || is_time && is_first);
+    if is_plain { names[index].clone() } else { format!("#{}", index + 1) }
+}
+
+fn preview_time(names: &[String], time: &TimePlan) -> TimePreview {
+    let name = |index: Option<usize>| index.map(|index| name_for_map(names, index, true));
+    match time.date {
+        Some(_) => TimePreview { column: None, date: name(time.date), clock: name(time.index) },
+        None => TimePreview { column: name(time.index), ..TimePreview::default() },
     }
-    name.find_meaning().filter(|ours| has(ours)).map(str::to_owned)
+}
+
+/// How two readings of one file differ, in words; `None` where they are the same. Columns that `changed` names are not compared.
+#[must_use]
+pub fn find_difference(before: &ReadRecording, after: &ReadRecording, changed: &[String]) -> Option<Bilingual> {
+    let (a, b) = (&before.recording, &after.recording);
+    if a.count_rows() != b.count_rows() || before.refused != after.refused {
+        let en = format!(
+            "{} rows and {} refused instead of {} and {}",
+            b.count_rows(),
+            after.refused,
+            a.count_rows(),
+            before.refused
+        );
+        let zh =
+            format!("{}行、拒绝{}行，而原为{}行、{}行", b.count_rows(), after.refused, a.count_rows(), before.refused);
+        return Some(Bilingual::new(en, zh));
+    }
+    if a.start_ns != b.start_ns || a.time_s != b.time_s {
+        let row = (0..a.count_rows()).find(|row| a.time_s[*row] != b.time_s[*row]).unwrap_or(0);
+        let (was, is) = (format_time(a, row), format_time(b, row));
+        let en = format!("data row {} is at {is} instead of {was}", row + 1);
+        return Some(Bilingual::new(en, format!("第{}个数据行的时间为{is}，而原为{was}", row + 1)));
+    }
+    let is_compared = |column: &&Column| !changed.contains(&column.name);
+    for (one, other) in [(a, b), (b, a)] {
+        for column in one.columns().iter().filter(is_compared) {
+            let found = other.columns().iter().find(|found| found.name == column.name);
+            if found.is_none_or(|found| found.cells != column.cells) {
+                let what = if found.is_none() {
+                    ("is in one reading only", "只在一种读法中存在")
+                } else {
+                    ("has other values", "数值不同")
+                };
+                return Some(Bilingual::new(
+                    format!("column {} {}", column.name, what.0),
+                    format!("列{}{}", column.name, what.1),
+                ));
+            }
+        }
+    }
+    None
 }
 
 /// The names of the columns, time first, and the first rows as text.

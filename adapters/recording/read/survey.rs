@@ -1,12 +1,16 @@
 //! What stands in each column, counted over every row before anything is decided: one strange cell in the first row decides nothing.
 
 use super::cell::{Cell, Shape, is_absent, is_absent_number, parse_flag, written_number};
+use super::compact_moment::{CompactKind, parse_compact};
 use super::error::RecordingError;
 use super::head::Head;
 use super::moment::{OrderEvidence, written_moment};
 use super::table::{Row, Table, VisitStep};
 use adapter_core::clock::SECOND_NS;
+use std::collections::BTreeMap;
 
+/// Words behind numbers that are told apart.
+const SUFFIXES_MAX: usize = 16;
 /// Examples kept of each strange kind.
 const EXAMPLES: usize = 5;
 
@@ -34,10 +38,13 @@ pub(super) struct ColumnSurvey {
     pub(super) comma_or_thousands: u64,
     pub(super) point_example: Option<Example>,
     pub(super) comma_example: Option<Example>,
-    /// What stands behind every number; `None` where they differ.
-    pub(super) suffix: Option<String>,
+    /// What stands behind numbers, how often; of many only the first.
+    pub(super) suffixes: BTreeMap<String, u64>,
     pub(super) suffixed: u64,
-    suffix_differs: bool,
+    /// Numbers that are a moment in digits as well: date and time, a date alone, a time alone.
+    pub(super) compact_moments: u64,
+    pub(super) compact_dates: u64,
+    pub(super) compact_times: u64,
     /// Text that is a moment: with date, without one, with a zone.
     pub(super) moments: u64,
     pub(super) times_of_day: u64,
@@ -82,6 +89,10 @@ impl ColumnSurvey {
             Cell::Number(number) if number.is_finite() => {
                 self.typed += 1;
                 self.record_number(number);
+                // Fourteen digits are exact in a double.
+                if (1e13..1e14).contains(&number) || (1e7..1e8).contains(&number) {
+                    self.see_digits(&number.to_string());
+                }
             }
             Cell::Number(_) => self.absent += 1,
             Cell::Flag(_) => {
@@ -116,6 +127,7 @@ impl ColumnSurvey {
                 Shape::CommaOrThousands => self.comma_or_thousands += 1,
             }
             self.see_suffix(number.suffix);
+            self.see_digits(text);
             if let Some(number) = number.parse_value(super::cell::Decimal::Point) {
                 self.record_number(number);
             }
@@ -143,14 +155,23 @@ impl ColumnSurvey {
     }
 
     fn see_suffix(&mut self, suffix: &str) {
-        self.suffixed += u64::from(!suffix.is_empty());
-        match &self.suffix {
-            None if !suffix.is_empty() && !self.suffix_differs => self.suffix = Some(suffix.to_owned()),
-            Some(known) if known != suffix && !suffix.is_empty() => {
-                self.suffix_differs = true;
-                self.suffix = None;
-            }
-            _ => {}
+        if suffix.is_empty() {
+            return;
+        }
+        self.suffixed += 1;
+        if let Some(count) = self.suffixes.get_mut(suffix) {
+            *count += 1;
+        } else if self.suffixes.len() < SUFFIXES_MAX {
+            self.suffixes.insert(suffix.to_owned(), 1);
+        }
+    }
+
+    fn see_digits(&mut self, text: &str) {
+        match parse_compact(text) {
+            Some((CompactKind::Moment, _)) => self.compact_moments += 1,
+            Some((CompactKind::Date, _)) => self.compact_dates += 1,
+            Some((CompactKind::TimeOfDay, _)) => self.compact_times += 1,
+            None => {}
         }
     }
 
@@ -198,10 +219,14 @@ pub(super) fn repeats_header(row: &Row<'_>, head: &Head) -> bool {
     row.cells.len() >= head.names.len() && row.cells.iter().zip(&head.names).all(same)
 }
 
+/// First cells of the lines that InfluxDB writes before every table of its annotated CSV.
+const ANNOTATIONS: [&str; 3] = ["#group", "#datatype", "#default"];
+
 /// A line of remarks among the data: a sign before it, and not as many cells as there are columns.
 pub(super) fn is_comment(row: &Row<'_>, head: &Head) -> bool {
-    matches!(row.cells.first(), Some(Cell::Text(text)) if text.starts_with('#') || text.starts_with("//"))
-        && row.cells.iter().filter(|cell| **cell != Cell::Empty).count() < head.names.len()
+    matches!(row.cells.first(), Some(Cell::Text(text)) if ANNOTATIONS.contains(text))
+        || matches!(row.cells.first(), Some(Cell::Text(text)) if text.starts_with('#') || text.starts_with("//"))
+            && row.cells.iter().filter(|cell| **cell != Cell::Empty).count() < head.names.len()
 }
 
 /// The cells of a row that belong to columns with a name; `None` where the row is wider or narrower than the header.
@@ -217,7 +242,7 @@ pub(super) fn fit_row<'a>(row: &Row<'a>, head: &Head, may_be_short: bool) -> Opt
 /// Goes through the whole table.
 pub(super) fn survey_table(table: &dyn Table, head: &Head) -> Result<Survey, RecordingError> {
     let mut found = Survey { columns: vec![ColumnSurvey::default(); head.names.len()], ..Survey::default() };
-    let short = table.may_be_short();
+    let short = table.may_be_short() || head.short;
     table.visit_rows(&mut |row| {
         if row.line < head.data_line {
             return Ok(VisitStep::Next);

@@ -2,6 +2,7 @@
 
 use super::cell::Cell;
 use super::error::RecordingError;
+use super::plan::Note;
 use adapter_core::bilingual::Bilingual;
 use adapter_core::clock::TimeNs;
 
@@ -28,6 +29,16 @@ pub(super) trait Table {
 
     /// How the file is written, for the statement: separator, encoding, sheet.
     fn describe_form(&self) -> Vec<Bilingual>;
+
+    /// The line that holds the names, where the format says it.
+    fn find_names_line(&self) -> Option<u64> {
+        None
+    }
+
+    /// What of the file is not used or may be wrong, for the user.
+    fn list_notes(&self) -> Vec<Note> {
+        Vec::new()
+    }
 
     /// May a row be shorter than the header, because the format leaves out what is empty?
     fn may_be_short(&self) -> bool {
@@ -69,6 +80,7 @@ pub(super) struct MemoryTable {
     /// Line and cells of each row.
     pub(super) rows: Vec<(u64, Vec<OwnedCell>)>,
     pub(super) form: Vec<Bilingual>,
+    pub(super) notes: Vec<Note>,
 }
 
 impl Table for MemoryTable {
@@ -88,6 +100,10 @@ impl Table for MemoryTable {
         self.form.clone()
     }
 
+    fn list_notes(&self) -> Vec<Note> {
+        self.notes.clone()
+    }
+
     fn may_be_short(&self) -> bool {
         true
     }
@@ -99,6 +115,7 @@ pub(super) struct ColumnTable {
     /// Name and cells of each column.
     pub(super) columns: Vec<(String, ColumnCells)>,
     pub(super) form: Vec<Bilingual>,
+    pub(super) notes: Vec<Note>,
 }
 
 /// The cells of a column in memory.
@@ -149,5 +166,13 @@ impl Table for ColumnTable {
 
     fn describe_form(&self) -> Vec<Bilingual> {
         self.form.clone()
+    }
+
+    fn find_names_line(&self) -> Option<u64> {
+        Some(1)
+    }
+
+    fn list_notes(&self) -> Vec<Note> {
+        self.notes.clone()
     }
 }

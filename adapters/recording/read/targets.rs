@@ -19,9 +19,7 @@ pub(super) fn find_targets(
     notes: &mut Vec<Note>,
 ) -> Result<Vec<(usize, ColumnTarget)>, RecordingError> {
     let of_time = |index: &usize| {
-        clocks
-            .iter()
-            .any(|clock| clock.index == *index || clock.date == Some(*index) || clock.milliseconds == Some(*index))
+        clocks.iter().any(|clock| clock.uses_column(*index))
             || is_contract && ["time_s", "time_utc"].contains(&columns.names[*index].text.as_str())
     };
     unknown_mappings(columns)?;
@@ -41,6 +39,8 @@ pub(super) struct ColumnTarget {
     pub(super) name: String,
     pub(super) factor: f64,
     pub(super) offset: f64,
+    /// The unit that factor and offset begin from, where one is known.
+    pub(super) unit: Option<String>,
     /// Found by its foreign name, not by a map and not by ours.
     pub(super) is_guess: bool,
 }
@@ -83,7 +83,7 @@ fn find_target(
         }
         return Ok(None);
     }
-    let own = ColumnTarget { name: name.text.clone(), factor: 1.0, offset: 0.0, is_guess: false };
+    let own = own_target(name);
     let is_ours = ChannelId::from_name(&name.text).is_some() || TEXT_COLUMNS.contains(&name.text.as_str());
     if is_ours || is_contract {
         if ChannelId::from_name(&name.text).is_some() {
@@ -94,13 +94,18 @@ fn find_target(
     match name.find_meaning() {
         Some(ours) => {
             let (factor, offset) = name.find_conversion(ours).unwrap_or((1.0, 0.0));
-            Ok(Some(ColumnTarget { name: ours.to_owned(), factor, offset, is_guess: true }))
+            Ok(Some(ColumnTarget { name: ours.to_owned(), factor, offset, unit: name.unit.clone(), is_guess: true }))
         }
         None => {
             note_doubt(name, survey, notes);
             Ok(Some(own))
         }
     }
+}
+
+/// A column under its own name, as it stands there.
+fn own_target(name: &ForeignName) -> ColumnTarget {
+    ColumnTarget { name: name.text.clone(), factor: 1.0, offset: 0.0, unit: name.unit.clone(), is_guess: false }
 }
 
 /// One of ours whose line of units says another unit.
@@ -150,6 +155,7 @@ fn mapped_target(
         name: mapped.to.clone(),
         factor: factor * scale,
         offset: offset * scale + mapped.offset.unwrap_or(0.0),
+        unit: unit.map(str::to_owned),
         is_guess: false,
     };
     Ok(Some(target))
@@ -177,33 +183,30 @@ fn note_doubt(name: &ForeignName, survey: &ColumnSurvey, notes: &mut Vec<Note>) 
     let _ = first;
 }
 
-/// Two columns that would get the same name: guesses give way, anything else is refused.
+/// Two columns that would get the same name: guesses give way to their own names, and names that stand twice in the file get their place.
+/// A map that names one twice is refused.
 fn resolve_duplicates(
     columns: &ForeignColumns<'_>,
     all: &mut [(usize, ColumnTarget)],
     notes: &mut Vec<Note>,
 ) -> Result<(), RecordingError> {
-    let mut by_name: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-    for (place, (_, target)) in all.iter().enumerate() {
-        by_name.entry(target.name.clone()).or_default().push(place);
-    }
-    for (name, places) in by_name.into_iter().filter(|(_, places)| places.len() > 1) {
-        let sure: Vec<usize> = places.iter().copied().filter(|place| !all[*place].1.is_guess).collect();
-        if sure.len() > 1 {
+    let is_mapped = |index: usize| columns.mapping.find_column(&columns.names[index].text, index).is_some();
+    for (name, places) in list_duplicates(all) {
+        let mapped: Vec<usize> = places.iter().map(|place| all[*place].0).filter(|index| is_mapped(*index)).collect();
+        if let [_, second, ..] = mapped[..] {
             return Err(columns.build_header_error(
-                format!("column {name} appears twice: rename one of them, or leave one out in a map (from = \"#{}\", to = \"\")", all[sure[1]].0 + 1),
-                format!("列{name}出现两次：请改名，或在映射文件中去掉一个（from = \"#{}\", to = \"\"）", all[sure[1]].0 + 1),
+                format!(
+                    "column {name} appears twice: say in the map which one is meant by its place (from = \"#{}\")",
+                    second + 1
+                ),
+                format!("列{name}出现两次：请在映射文件中用列号指定（from = \"#{}\"）", second + 1),
             ));
         }
-        let texts: Vec<String> = places.iter().map(|place| columns.names[all[*place].0].text.clone()).collect();
-        for place in places {
-            let (index, target) = &mut all[place];
-            if !target.is_guess {
-                continue;
-            }
-            let foreign = &columns.names[*index].text;
-            *target = ColumnTarget { name: foreign.clone(), factor: 1.0, offset: 0.0, is_guess: false };
+        let guesses: Vec<usize> = places.iter().copied().filter(|place| all[*place].1.is_guess).collect();
+        if guesses.is_empty() {
+            continue;
         }
+        let texts: Vec<&str> = places.iter().map(|place| columns.names[all[*place].0].text.as_str()).collect();
         notes.push(Note::new(
             NoteKind::Doubt,
             format!(
@@ -212,16 +215,38 @@ fn resolve_duplicates(
             ),
             format!("{}都可能是{name}：均保留原名。请用映射文件指定：cnc-gateway recording map", texts.join("和")),
         ));
-    }
-    let mut seen: Vec<&str> = Vec::new();
-    for (_, target) in all.iter() {
-        if seen.contains(&target.name.as_str()) {
-            return Err(columns.build_header_error(
-                format!("column {} appears twice", target.name),
-                format!("列{}出现两次", target.name),
-            ));
+        for place in guesses {
+            all[place].1 = own_target(&columns.names[all[place].0]);
         }
-        seen.push(&target.name);
     }
-    Ok(())
+    for (name, places) in list_duplicates(all) {
+        let unmapped: Vec<usize> = places.into_iter().filter(|place| !is_mapped(all[*place].0)).collect();
+        let mut kept = Vec::new();
+        for place in unmapped {
+            let (index, target) = &mut all[place];
+            target.name = format!("{name} #{}", *index + 1);
+            kept.push(target.name.clone());
+        }
+        notes.push(Note::new(
+            NoteKind::Doubt,
+            format!("{name} stands more than once in the file: kept as {}. A map says what each is: cnc-gateway recording map", kept.join(" and ")),
+            format!("{name}在文件中出现多次：保留为{}。请用映射文件指定：cnc-gateway recording map", kept.join("和")),
+        ));
+    }
+    match list_duplicates(all).pop_first() {
+        Some((name, _)) => {
+            Err(columns.build_header_error(format!("column {name} appears twice"), format!("列{name}出现两次")))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Names that more than one column would get, with the places of these.
+fn list_duplicates(all: &[(usize, ColumnTarget)]) -> BTreeMap<String, Vec<usize>> {
+    let mut by_name: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    for (place, (_, target)) in all.iter().enumerate() {
+        by_name.entry(target.name.clone()).or_default().push(place);
+    }
+    by_name.retain(|_, places| places.len() > 1);
+    by_name
 }

@@ -6,6 +6,7 @@ use super::error::RecordingError;
 use super::input::Input;
 use super::limits::{COLUMNS_MAX, HEAD_BYTES, ROW_BYTES_MAX};
 use super::moment::written_moment;
+use super::plan::{Note, NoteKind};
 use super::splitter::{SplitError, Splitter};
 use super::table::{Row, Table, Visit, VisitStep};
 use adapter_core::bilingual::Bilingual;
@@ -62,6 +63,8 @@ pub(super) struct TextTable {
     pub(super) input: Input,
     pub(super) encoding: DetectedEncoding,
     pub(super) separator: Separator,
+    /// The encoding was said, not found.
+    is_given: bool,
     /// A line `sep=;` stands before everything.
     separator_line: bool,
     /// Rows may leave out cells at their end.
@@ -75,11 +78,14 @@ impl TextTable {
         encoding: Option<&'static encoding_rs::Encoding>,
         separator: Option<Separator>,
     ) -> Result<Self, RecordingError> {
+        let is_given = encoding.is_some();
         let encoding = match encoding {
             Some(encoding) => DetectedEncoding { encoding, has_mark: false },
             None => detect_encoding(&input)?,
         };
-        let mut table = Self { input, encoding, separator: Separator::Sign(b','), separator_line: false, short: false };
+        let separator_found = Separator::Sign(b',');
+        let mut table =
+            Self { input, encoding, separator: separator_found, is_given, separator_line: false, short: false };
         let head = table.read_head()?;
         let told = told_separator(&head);
         table.separator_line = told.is_some();
@@ -222,6 +228,21 @@ impl Table for TextTable {
 
     fn may_be_short(&self) -> bool {
         self.short
+    }
+
+    fn list_notes(&self) -> Vec<Note> {
+        let encoding = self.encoding.encoding;
+        if self.is_given || encoding != encoding_rs::SHIFT_JIS {
+            return Vec::new();
+        }
+        let name = encoding.name();
+        vec![Note::new(
+            NoteKind::Doubt,
+            format!(
+                "the characters are read as {name}; if the names look wrong, say the encoding in a map (encoding = \"GBK\")"
+            ),
+            format!("字符按{name}读取；如列名有误，请在映射文件中指定编码（encoding = \"GBK\"）"),
+        )]
     }
 }
 

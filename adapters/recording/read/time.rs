@@ -2,6 +2,7 @@
 
 use super::mapping::TimeMapping;
 use super::plan::{Note, NoteKind};
+use super::restart::{divide_at, note_restarts};
 use crate::Words;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use jiff::tz::{AmbiguousOffset, TimeZone};
@@ -26,6 +27,8 @@ pub(super) struct Timed {
     /// Seconds as given, or since the first row where the day is known.
     pub(super) time_s: Vec<f64>,
     pub(super) start_ns: Option<TimeNs>,
+    /// Rows at which time begins again and a new run with it, as the map says.
+    pub(super) restarts: Vec<usize>,
     /// Rows whose time does not fit among those of the others, with the reason.
     pub(super) out_of_order: Vec<(usize, String)>,
 }
@@ -51,7 +54,12 @@ pub(super) fn resolve_times(
     if mapping.set_back.as_deref() == Some("join") {
         join_set_back(&mut timed.time_s, notes);
     }
-    let stretches = time_stretches(raw.len(), runs.filter(|_| !is_absolute));
+    let mut stretches = time_stretches(raw.len(), runs.filter(|_| !is_absolute));
+    if mapping.set_back.as_deref() == Some("run") {
+        timed.restarts = (1..raw.len()).filter(|row| timed.time_s[*row] < timed.time_s[row - 1]).collect();
+        note_restarts(timed.restarts.len(), notes);
+        stretches = divide_at(stretches, &timed.restarts);
+    }
     for rows in stretches {
         spread_stamps(&mut timed.time_s[rows.clone()], notes);
         let start = rows.start;
@@ -100,7 +108,11 @@ fn to_seconds(raw: &[RawTime], notes: &mut Vec<Note>) -> Vec<f64> {
             }
             times[row] += days;
         }
-        notes.push(Note::new(NoteKind::Assumption, "times of day without a date", "只有时刻，没有日期"));
+        notes.push(Note::new(
+            NoteKind::Assumption,
+            "times of day or durations, without a date",
+            "只有时刻或时长，没有日期",
+        ));
     }
     times
 }
@@ -130,7 +142,7 @@ fn resolve_moments(raw: &[RawTime], mapping: &TimeMapping, notes: &mut Vec<Note>
     }
     let start_ns = utc.first().copied();
     let since = |at_ns: &TimeNs| in_seconds(at_ns.saturating_sub(start_ns.unwrap_or(0)));
-    Timed { time_s: utc.iter().map(since).collect(), start_ns, out_of_order: Vec::new() }
+    Timed { time_s: utc.iter().map(since).collect(), start_ns, ..Timed::default() }
 }
 
 struct LocalClock {
@@ -286,7 +298,8 @@ fn out_of_order(times: &[f64]) -> Vec<(usize, String)> {
         let reason = match before {
             Some(before) if times[row] < before => {
                 format!(
-                    "time goes back from {before} s to {} s; a clock that was set back: [time] set_back = \"join\" in a map, or a new run there",
+                    "time goes back from {before} s to {} s; a clock that was set back: [time] set_back = \"join\" in a map; a new test that begins there: \
+                     set_back = \"run\"",
                     times[row]
                 )
             }

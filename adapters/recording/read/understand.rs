@@ -2,6 +2,7 @@
 //! what is assumed is said.
 
 use super::cell::{Decimal, flag_words};
+use super::cell_unit::{find_unit_of_cells, plan_cell_units};
 use super::clock::ForeignColumns;
 use super::error::RecordingError;
 use super::head::Head;
@@ -20,8 +21,11 @@ pub(super) fn build_plan(
     mapping: &Mapping,
     file: &str,
 ) -> Result<ReadPlan, RecordingError> {
-    let names: Vec<ForeignName> =
+    let mut names: Vec<ForeignName> =
         head.names.iter().zip(&head.units).map(|(name, unit)| ForeignName::from_text(name, unit.as_deref())).collect();
+    for (name, survey) in names.iter_mut().zip(&survey.columns).filter(|(name, _)| name.unit.is_none()) {
+        name.unit = find_unit_of_cells(survey);
+    }
     let mut columns = ForeignColumns {
         file,
         head,
@@ -34,13 +38,31 @@ pub(super) fn build_plan(
     let is_contract = head.names.iter().any(|name| ["time_s", "time_utc"].contains(&name.as_str()));
     let mut notes = Vec::new();
     form_notes(head, &columns, survey, &mut notes);
-    let clocks = columns.find_clocks(&mut notes)?;
+    let own = columns.find_own_clocks(&mut notes)?;
+    let mut clocks = match columns.find_clocks(&mut notes) {
+        Ok(clocks) => clocks,
+        Err(error) if own.is_empty() => return Err(error),
+        Err(_) => Vec::new(),
+    };
+    let shared = clocks.len();
+    clocks.extend(own.iter().map(|own| own.time.clone()));
     let targets = find_targets(&columns, &clocks, is_contract, &mut notes)?;
     let mut blocks: Vec<BlockPlan> = clocks.into_iter().map(|time| BlockPlan { time, columns: Vec::new() }).collect();
     for (index, target) in targets {
         let planned = plan_column(&columns, index, target, is_contract, &mut notes)?;
-        // Each column goes with the last clock before it.
-        let block = blocks.iter().rposition(|block| block.time.index < index).unwrap_or(0);
+        let of_own = own.iter().position(|own| own.columns.contains(&index)).map(|place| shared + place);
+        // Each other column goes with the last clock before it.
+        let before =
+            || blocks[..shared].iter().rposition(|block| block.time.index < Some(index)).or((shared > 0).then_some(0));
+        let Some(block) = of_own.or_else(before) else {
+            let source = &planned.source;
+            notes.push(Note::new(
+                NoteKind::Loss,
+                format!("{source} belongs to no clock of the map and is left out"),
+                format!("{source}不属于映射文件中的任何时钟，未读取"),
+            ));
+            continue;
+        };
         blocks[block].columns.push(planned);
     }
     blocks.retain(|block| !block.columns.is_empty());
@@ -150,6 +172,10 @@ fn plan_column(
 ) -> Result<PlannedColumn, RecordingError> {
     let survey = &columns.surveys[index];
     let source = columns.names[index].text.clone();
+    let mapped = columns.mapping.find_column(&source, index);
+    // A person who says the unit means the numbers as they stand there.
+    let unit = target.unit.as_deref();
+    let cell_units = plan_cell_units(survey, unit).filter(|_| mapped.is_none_or(|mapped| mapped.unit.is_none()));
     let is_text = TEXT_COLUMNS.contains(&target.name.as_str())
         || target.name.ends_with("_missing")
         || ChannelId::from_name(&target.name).is_some_and(|id| id.channel().kind == Kind::Text);
@@ -196,11 +222,21 @@ fn plan_column(
             ),
         });
     }
-    if target.is_guess || columns.mapping.find_column(&source, index).is_some() && source != target.name {
+    if let Some(units) =
+        cell_units.as_ref().filter(|units| units.has_several() && matches!(kind, PlannedKind::Numbers { .. }))
+    {
+        let unit = unit.unwrap_or_default();
+        notes.push(Note::new(
+            NoteKind::Assumption,
+            format!("{source}: its cells are in {}, taken together in {unit}", units.list_units()),
+            format!("{source}：单元格单位有{}，统一为{unit}", units.list_units()),
+        ));
+    }
+    if target.is_guess || mapped.is_some() && source != target.name {
         notes.push(note_change(&columns.names[index], &target));
     }
     let strict = is_contract && known;
-    Ok(PlannedColumn { index, name: target.name, source, kind, strict })
+    Ok(PlannedColumn { index, name: target.name, source, kind, strict, cell_units })
 }
 
 fn flag_note(survey: &ColumnSurvey, target: &ColumnTarget, notes: &mut Vec<Note>) {

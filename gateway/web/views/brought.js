@@ -209,7 +209,7 @@ export class Brought {
     const hint = (column) =>
       column.is_time ? t("is_time") : column.asked ? t("may_be", column.candidates.slice(0, 3).join(", ")) : "";
     const rows = this.choices.map(({ column, to, unit }) => [
-      column.from,
+      column.name === column.from ? column.from : `${column.from} ${column.name}`,
       column.is_time ? t("time") : { text: to },
       column.is_time ? (column.unit ?? "") : { text: unit },
       hint(column),

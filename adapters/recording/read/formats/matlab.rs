@@ -88,7 +88,7 @@ fn build_table(variables: Vec<Variable>, input: &Input) -> Result<ColumnTable, R
             columns.push((name, ColumnCells::Numbers(part)));
         }
     }
-    Ok(ColumnTable { columns, form })
+    Ok(ColumnTable { columns, form, ..ColumnTable::default() })
 }
 
 fn version_5(bytes: &[u8]) -> Option<Vec<Variable>> {

@@ -6,43 +6,20 @@ mod labview;
 mod matlab;
 mod mtconnect;
 mod parquet;
+mod refused;
+mod shdr;
 mod tdms;
 mod tdms_channel;
+mod tdms_scaling;
 mod workbook;
 
+use super::encoding::Decoded;
 use super::error::RecordingError;
 use super::input::Input;
 use super::limits::UNPACKED_BYTES_MAX;
 use super::mapping::Mapping;
 use super::table::Table;
 use super::text::{Separator, TextTable};
-
-/// First bytes, name of the format, what to do.
-type RefusedFormat = (&'static [u8], &'static str, &'static str, &'static str);
-
-const REFUSED: &[RefusedFormat] = &[
-    (
-        b"\x89HDF\r\n\x1a\n",
-        "HDF5",
-        "export it as CSV or Parquet (pandas: to_csv, to_parquet)",
-        "请导出为CSV或Parquet（pandas：to_csv、to_parquet）",
-    ),
-    (b"MDF     ", "an MDF file (ASAM)", "export it as CSV or MAT (version 7)", "请导出为CSV或MAT（版本7）"),
-    (
-        b"SQLite format 3\0",
-        "a database of SQLite",
-        "a history of this box is written history:FILE",
-        "本网关的历史数据库请写作history:文件",
-    ),
-    (b"ARROW1", "Feather (Arrow)", "write Parquet in its place (to_parquet)", "请改用Parquet（to_parquet）"),
-    (b"RIFF", "a sound file", "export it as CSV with its rate", "请连同采样率导出为CSV"),
-    (b"7z\xbc\xaf", "a 7z archive", "unpack it first", "请先解压"),
-    (b"Rar!", "a RAR archive", "unpack it first", "请先解压"),
-    (b"%PDF", "a PDF", "export the table as CSV or xlsx", "请将表格导出为CSV或xlsx"),
-    (b"\x80\x04\x95", "a pickle of Python", "write Parquet in its place (to_parquet)", "请改用Parquet（to_parquet）"),
-    (b"RDX3\n", "a workspace of R", "write it as CSV (write.csv)", "请导出为CSV（write.csv）"),
-    (b"\x28\xb5\x2f\xfd", "a file packed by zstd", "unpack it first, or pack it with gzip", "请先解压，或用gzip压缩"),
-];
 
 /// Reads by a library of others. A damaged file may break off inside it, which is an answer about the file and not the end of
 /// this program (calamine 0.38 indexes into what an xls file says of itself).
@@ -60,13 +37,7 @@ fn catch_damage<T>(input: &Input, read: impl FnOnce() -> Result<T, RecordingErro
 /// Opens a file as a table.
 pub(super) fn open_table(input: Input, mapping: &Mapping) -> Result<Box<dyn Table>, RecordingError> {
     let head = input.read_head(1024)?;
-    if let Some((_, name, en, zh)) = REFUSED.iter().find(|(start, ..)| head.starts_with(start)) {
-        return Err(RecordingError::with_format_reason(
-            &input.file,
-            format!("this is {name}, which is not read: {en}"),
-            format!("该文件是{name}，无法读取：{zh}"),
-        ));
-    }
+    refused::refuse_by_name(&head, &input)?;
     if head.starts_with(b"PAR1") {
         return Ok(Box::new(catch_damage(&input, || parquet::open(&input))?));
     }
@@ -94,6 +65,10 @@ pub(super) fn open_table(input: Input, mapping: &Mapping) -> Result<Box<dyn Tabl
             "this is JSON, which is not read: write CSV or Parquet (pandas: to_csv, to_parquet)",
             "该文件是JSON，无法读取：请导出为CSV或Parquet（pandas：to_csv、to_parquet）",
         ));
+    }
+    if shdr::is_shdr(start) {
+        let decoded = Decoded::new(text.input.open()?, text.encoding);
+        return Ok(Box::new(shdr::open(decoded, &text.input.file)?));
     }
     if start.starts_with("LabVIEW Measurement") {
         return Ok(Box::new(labview::open(text.input)?));

@@ -107,7 +107,8 @@ pub(super) fn open(input: &Input) -> Result<ColumnTable, RecordingError> {
     let columns = stream.items.into_iter().filter(has_value).flat_map(|item| {
         [("Time".to_owned(), ColumnCells::Cells(item.times)), (item.name, ColumnCells::Cells(item.values))]
     });
-    Ok(ColumnTable { columns: columns.collect(), form: vec![Bilingual::new("MTConnect document", "MTConnect文档")] })
+    let form = vec![Bilingual::new("MTConnect document", "MTConnect文档")];
+    Ok(ColumnTable { columns: columns.collect(), form, ..ColumnTable::default() })
 }
 
 impl Stream {

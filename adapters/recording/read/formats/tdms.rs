@@ -137,6 +137,8 @@ impl TdmsFile {
                     let text = bytes.read_text()?;
                     if name == "unit_string" {
                         channel.unit = Some(text).filter(|unit| !unit.is_empty());
+                    } else {
+                        channel.scaling.accept_text(&name, text);
                     }
                 }
                 ValueKind::Moment => {
@@ -151,7 +153,7 @@ impl TdmsFile {
                     match name.as_str() {
                         "wf_increment" => channel.increment_s = Some(value).filter(|step_s| *step_s > 0.0),
                         "wf_start_offset" => channel.offset_s = value,
-                        _ => {}
+                        name => channel.scaling.accept_number(name, value),
                     }
                 }
                 ValueKind::Flag => {
@@ -239,6 +241,12 @@ impl TdmsFile {
                 format!("组{chosen}（共有{}）", groups.join("、")),
             ));
         }
+        let inherited = self
+            .channels
+            .iter()
+            .filter(|object| object.path.len() < 2)
+            .map(|object| (object.path.clone(), object.scaling.clone()))
+            .collect::<Vec<_>>();
         let mut columns: Vec<(String, ColumnCells)> = Vec::new();
         let mut clock: Option<WaveformClock> = None;
         for channel in self
@@ -254,13 +262,33 @@ impl TdmsFile {
             let name = channel.path.last().cloned().unwrap_or_default();
             let name = channel.unit.as_ref().map_or_else(|| name.clone(), |unit| format!("{name} [{unit}]"));
             let cells = match channel.values {
-                TdmsValues::Numbers(values) => ColumnCells::Numbers(values),
+                TdmsValues::Numbers(values) => {
+                    // What a channel does not say, its group says, and what that does not, the file.
+                    let of = |length: usize| {
+                        inherited
+                            .iter()
+                            .find(|(path, _)| path[..] == channel.path[..length])
+                            .map(|(_, scaling)| scaling)
+                    };
+                    let scaling = Some(&channel.scaling).filter(|scaling| scaling.says_something());
+                    let above = || (0..2).rev().filter_map(of).find(|scaling| scaling.says_something());
+                    let scaled = scaling
+                        .or_else(above)
+                        .map_or_else(|| Ok(values.clone()), |scaling| scaling.scale_values(&values));
+                    ColumnCells::Numbers(scaled.map_err(|kind| {
+                        RecordingError::with_format_reason(
+                            &input.file,
+                            format!("channel {name} holds raw values with a scale of the kind {kind}, which is not computed: save it as scaled waveforms"),
+                            format!("通道{name}为原始值，其换算类型{kind}不支持：请保存为已换算的波形"),
+                        )
+                    })?)
+                }
                 TdmsValues::Moments(values) => ColumnCells::Instants(values),
                 TdmsValues::Texts(values) => ColumnCells::Cells(values),
                 TdmsValues::None => continue,
             };
             columns.push((name, cells));
         }
-        Ok(ColumnTable { columns, form })
+        Ok(ColumnTable { columns, form, ..ColumnTable::default() })
     }
 }

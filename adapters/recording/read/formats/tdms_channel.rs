@@ -2,6 +2,7 @@
 
 use super::super::table::{ColumnCells, OwnedCell};
 use super::bytes::{ByteReader, NumberKind};
+use super::tdms_scaling::TdmsScaling;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 
 /// Seconds from 1904-01-01 to 1970-01-01.
@@ -63,6 +64,7 @@ pub(super) struct TdmsChannel {
     pub(super) index: Option<RawIndex>,
     pub(super) values: TdmsValues,
     pub(super) unit: Option<String>,
+    pub(super) scaling: TdmsScaling,
     pub(super) increment_s: Option<f64>,
     pub(super) offset_s: f64,
     pub(super) start_ns: Option<TimeNs>,

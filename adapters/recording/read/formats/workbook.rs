@@ -3,14 +3,17 @@
 use super::super::error::RecordingError;
 use super::super::input::Input;
 use super::super::limits::{CELLS_IN_MEMORY_MAX, COLUMNS_MAX, UNPACKED_BYTES_MAX};
+use super::super::plan::{Note, NoteKind};
 use super::super::table::{MemoryTable, OwnedCell};
 use adapter_core::bilingual::Bilingual;
 use adapter_core::clock::{SECOND_NS, TimeNs};
-use calamine::{Data, ExcelDateTime, Reader, Sheets};
+use calamine::{Data, ExcelDateTime, Range, Reader, Sheets};
 use std::io::{Cursor, Read};
 
 /// Days from 1899-12-30 to 1970-01-01.
 const EPOCH_DAYS: f64 = 25_569.0;
+/// Days from the zero of a spreadsheet to that of one that counts from 1904.
+const DAYS_1904: f64 = 1462.0;
 
 pub(super) fn open(input: &Input, sheet: Option<&str>) -> Result<MemoryTable, RecordingError> {
     let bytes = super::read_whole(input)?;
@@ -39,6 +42,7 @@ pub(super) fn open(input: &Input, sheet: Option<&str>) -> Result<MemoryTable, Re
     for (index, cells) in range.rows().enumerate() {
         table.rows.push((first + index as u64 + 1, cells.iter().map(convert_cell).collect()));
     }
+    note_formulas(&mut book, &chosen, &range, &mut table);
     if names.len() > 1 {
         table.form.push(Bilingual::new(
             format!("sheet {chosen} of {}", names.len()),
@@ -49,6 +53,47 @@ pub(super) fn open(input: &Input, sheet: Option<&str>) -> Result<MemoryTable, Re
 }
 
 type Book = Sheets<Cursor<Vec<u8>>>;
+
+/// Formulas whose results were never computed: a program wrote the workbook and no spreadsheet has opened it since. Looked for only where a
+/// column has nothing below its name.
+fn note_formulas(book: &mut Book, sheet: &str, range: &Range<Data>, table: &mut MemoryTable) {
+    let (rows, columns) = range.get_size();
+    let is_filled = |row: usize, column: usize| range.get((row, column)).is_some_and(|cell| *cell != Data::Empty);
+    let is_bare = |column: &usize| {
+        let filled = (0..rows).filter(|row| is_filled(*row, *column)).count();
+        filled >= 1 && filled <= 4 && rows > 2 * filled
+    };
+    let bare: Vec<usize> = (0..columns).filter(is_bare).collect();
+    let Some(formulas) = Some(()).filter(|()| !bare.is_empty()).and_then(|()| book.worksheet_formula(sheet).ok())
+    else {
+        return;
+    };
+    let (Some((first_row, first_column)), Some((formula_row, formula_column))) = (range.start(), formulas.start())
+    else {
+        return;
+    };
+    for column in bare {
+        let name = (0..rows).find_map(|row| range.get((row, column)).filter(|cell| **cell != Data::Empty));
+        let name = name.map_or_else(String::new, ToString::to_string);
+        let count = formulas
+            .used_cells()
+            .filter(|(row, at, _)| {
+                let (row, at) = (*row as u64 + u64::from(formula_row), *at as u64 + u64::from(formula_column));
+                let here = usize::try_from(row.saturating_sub(u64::from(first_row))).unwrap_or(usize::MAX);
+                at == column as u64 + u64::from(first_column) && !is_filled(here, column)
+            })
+            .count();
+        if count > 0 {
+            table.notes.push(Note::new(
+                NoteKind::Doubt,
+                format!(
+                    "{name}: {count} formulas without a stored result: open the workbook in a spreadsheet and save it"
+                ),
+                format!("{name}：{count}个公式没有保存结果：请用电子表格软件打开并保存"),
+            ));
+        }
+    }
+}
 
 /// The sheet that is asked for; else the one with the most cells.
 fn choose_sheet(
@@ -87,7 +132,7 @@ fn convert_cell(data: &Data) -> OwnedCell {
         #[expect(clippy::cast_precision_loss, reason = "a cell of a workbook holds 15 digits")]
         Data::Int(number) => OwnedCell::Number(*number as f64),
         Data::Float(number) => OwnedCell::Number(*number),
-        Data::String(text) | Data::DurationIso(text) => OwnedCell::from_text(text.trim()),
+        Data::String(text) | Data::DurationIso(text) => OwnedCell::from_text(strip_quotes(text.trim())),
         Data::Bool(flag) => OwnedCell::Flag(*flag),
         Data::DateTime(at) => convert_moment(*at),
         Data::DateTimeIso(text) => text.parse::<jiff::civil::DateTime>().map_or_else(
@@ -100,6 +145,12 @@ fn convert_cell(data: &Data) -> OwnedCell {
             },
         ),
     }
+}
+
+/// A text that was quoted once more when it was saved.
+fn strip_quotes(text: &str) -> &str {
+    let inner = text.strip_prefix('"').and_then(|text| text.strip_suffix('"'));
+    inner.filter(|inner| !inner.contains('"')).unwrap_or(text)
 }
 
 /// A day with a time is a moment on the wall, a time alone a time of day, and a duration a number of seconds.
@@ -116,7 +167,19 @@ fn convert_moment(at: ExcelDateTime) -> OwnedCell {
         let (s, m, h) = (ms / 1000, ms / 60_000, ms / 3_600_000);
         return OwnedCell::from_text(&format!("{h:02}:{:02}:{:02}.{:03}", m % 60, s % 60, ms % 1000));
     }
-    OwnedCell::Local(milliseconds(days - EPOCH_DAYS).saturating_mul(SECOND_NS / 1000))
+    // A workbook that counts from 1904 says so; the library then adds its 1,462 days in the date and not in the number.
+    let (year, month, day, ..) = at.to_ymd_hms_milli();
+    let date = jiff::civil::Date::new(
+        i16::try_from(year).unwrap_or(0),
+        i8::try_from(month).unwrap_or(0),
+        i8::try_from(day).unwrap_or(0),
+    );
+    let shift_days = date.map_or(0.0, |date| {
+        let counted =
+            f64::from((date - jiff::civil::Date::constant(1970, 1, 1)).get_days()) - (days - EPOCH_DAYS).floor();
+        if counted > 1400.0 { DAYS_1904 } else { 0.0 }
+    });
+    OwnedCell::Local(milliseconds(days + shift_days - EPOCH_DAYS).saturating_mul(SECOND_NS / 1000))
 }
 
 /// Counts what the parts of the archive really come to: what they claim may be a lie.
