@@ -5,7 +5,6 @@
 //! seen to it at the machine (started again after a feed hold, or after the program stood) or has acknowledged it on the
 //! box. A limit that chatters therefore stops the machine once and not fifty times.
 
-use super::find_channel;
 use adapter_core::words::execution;
 use adapter_core::{ChannelId, LadderRequest, Sample};
 use rules::script::{Stop, StopRequest};
@@ -60,6 +59,8 @@ impl AskOutcome {
     }
 }
 
+const EXECUTION: ChannelId = ChannelId::named("execution");
+
 /// One kind of request.
 #[derive(Debug, Clone, Copy, Default)]
 struct Latch {
@@ -72,7 +73,6 @@ struct Latch {
 #[derive(Debug)]
 pub(super) struct Asks {
     latches: [Latch; 2],
-    execution: Option<ChannelId>,
     /// The machine has been in feed hold, has stood, since it last ran.
     held: bool,
     stood: bool,
@@ -80,7 +80,7 @@ pub(super) struct Asks {
 
 impl Asks {
     pub(super) fn new() -> Self {
-        Self { latches: Default::default(), execution: find_channel("execution"), held: false, stood: false }
+        Self { latches: Default::default(), held: false, stood: false }
     }
 
     pub(super) fn judge_requests(
@@ -112,7 +112,7 @@ impl Asks {
 
     /// The operator has started again after a feed hold, or after the program stood.
     fn seen_to(&mut self, sample: &Sample) {
-        let Some(word) = self.execution.and_then(|id| sample.text(id)) else { return };
+        let Some(word) = sample.text(EXECUTION) else { return };
         self.held |= word == execution::FEED_HOLD;
         self.stood |= word == execution::STOPPED;
         if word != execution::ACTIVE {
