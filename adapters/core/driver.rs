@@ -3,6 +3,7 @@
 use crate::channel::ChannelId;
 use crate::clock::{Clock, TimeNs};
 use crate::reading::{Absence, Reading};
+use crate::text::shorten_text;
 use crate::units::OverridePct;
 use std::time::Duration;
 use thiserror::Error;
@@ -73,6 +74,17 @@ pub enum SourceError {
 }
 
 impl SourceError {
+    /// The same with what the device said cut to the length that is told of it.
+    #[must_use]
+    pub fn with_short_texts(mut self) -> Self {
+        let cut = |text: &mut String| *text = shorten_text(std::mem::take(text));
+        match &mut self {
+            Self::Line { what, .. } | Self::Refused { what, .. } | Self::Decode { what, .. } => cut(what),
+            Self::Timeout { .. } | Self::Off { .. } | Self::End { .. } => {}
+        }
+        self
+    }
+
     /// The reason that every channel of the source gets while this lasts.
     #[must_use]
     pub fn to_absence(&self) -> Absence {
@@ -115,7 +127,7 @@ impl Fact {
     /// A name or a sentence.
     #[must_use]
     pub fn from_text(name: impl Into<String>, text: impl Into<String>) -> Self {
-        Self { name: name.into(), value: FactValue::Text(text.into()) }
+        Self { name: name.into(), value: FactValue::Text(shorten_text(text.into())) }
     }
 }
 
@@ -126,6 +138,14 @@ pub struct SourceProblem {
     pub what: String,
     /// What to do next.
     pub next: String,
+}
+
+impl SourceProblem {
+    /// The same with what the device said cut to the length that is told of it.
+    #[must_use]
+    pub fn with_short_texts(self) -> Self {
+        Self { what: shorten_text(self.what), next: shorten_text(self.next) }
+    }
 }
 
 /// Something that a device offers, whether a channel takes it or not.

@@ -8,6 +8,7 @@
 use crate::channel::ChannelId;
 use crate::driver::{Fact, SourceProblem};
 use crate::reading::Reading;
+use crate::text::TEXT_BYTES_MAX;
 use std::collections::BTreeMap;
 
 /// What was said of one channel and not believed.
@@ -23,12 +24,19 @@ struct Doubt {
 #[derive(Debug, Clone, Default)]
 pub struct Plausibility {
     doubts: BTreeMap<ChannelId, Doubt>,
+    /// Channels whose last text was longer than is kept, and how long the first of this stretch was, bytes.
+    cut_texts: BTreeMap<ChannelId, usize>,
 }
 
 impl Plausibility {
     /// Takes the readings of a poll.
     pub fn record_readings(&mut self, readings: &[Reading]) {
         for reading in readings {
+            match reading.cut_from_bytes() {
+                Some(bytes) => drop(self.cut_texts.entry(reading.channel).or_insert(bytes)),
+                None if reading.value.is_ok() => drop(self.cut_texts.remove(&reading.channel)),
+                None => {}
+            }
             match (reading.implausible, self.doubts.get_mut(&reading.channel)) {
                 (Some(number), Some(doubt)) => {
                     doubt.count += 1;
@@ -57,14 +65,23 @@ impl Plausibility {
             .then(|| Fact::from_number("implausible_readings", self.count_implausible() as f64))
     }
 
-    /// What is not believed at the moment, one sentence per channel whose range tells against it.
+    /// What is not believed or not kept whole at the moment, one sentence per channel.
     #[must_use]
     pub fn list_problems(&self) -> Vec<SourceProblem> {
         let standing = self.doubts.iter().filter_map(|(channel, doubt)| Some((channel, doubt.standing?)));
         standing
             .filter(|(channel, number)| !channel.channel().accepts_number(*number))
             .map(describe_implausible)
+            .chain(self.cut_texts.iter().map(describe_cut_text))
             .collect()
+    }
+}
+
+fn describe_cut_text((id, bytes): (&ChannelId, &usize)) -> SourceProblem {
+    SourceProblem {
+        what: format!("{id} has a text of {bytes} bytes; only the first {TEXT_BYTES_MAX} are kept"),
+        next: "Look at what sends it: no control has a text of this length; a broker may let strangers publish"
+            .to_owned(),
     }
 }
 
@@ -107,6 +124,19 @@ mod tests {
         assert_eq!(plausibility.count_implausible(), 2);
         plausibility.record_readings(&[reading(401.0)]);
         assert!(plausibility.list_problems().is_empty() && plausibility.count_implausible() == 2, "counted, and over");
+    }
+
+    #[test]
+    fn a_text_that_is_too_long_is_told_while_it_lasts() {
+        let program = ChannelId::from_name("program").expect("in the table");
+        let read = |text: &str| [Reading::from_text(program, Stamp::from_exact_time(0), text.into())];
+        let mut plausibility = Plausibility::default();
+        plausibility.record_readings(&read(&"P".repeat(70_000)));
+        plausibility.record_readings(&read(&"P".repeat(80_000)));
+        let told = plausibility.list_problems();
+        assert!(told.len() == 1 && told[0].what.contains("program has a text of 70000 bytes"), "{told:?}");
+        plausibility.record_readings(&read("O1234"));
+        assert_eq!(plausibility.list_problems(), []);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::channel::ChannelId;
 use crate::clock::TimeNs;
+use crate::text::limit_text;
 use std::fmt;
 use std::sync::Arc;
 
@@ -163,6 +164,9 @@ pub struct Reading {
     pub value: Result<Value, Absence>,
     /// What the device said, where it is not believed.
     pub implausible: Option<f64>,
+    /// How long the text of the device was, bytes, where only its beginning is kept. Not public: no reading with a text is made but
+    /// by [`Reading::from_text`].
+    cut_from_bytes: Option<usize>,
 }
 
 impl Reading {
@@ -171,7 +175,7 @@ impl Reading {
     #[must_use]
     pub fn from_number(channel: ChannelId, stamp: Stamp, number: f64) -> Self {
         if channel.channel().accepts_number(number) {
-            return Self { channel, stamp, value: Value::from_number(number), implausible: None };
+            return Self::from_value(channel, stamp, Value::from_number(number));
         }
         Self::from_implausible(channel, stamp, number)
     }
@@ -179,25 +183,58 @@ impl Reading {
     /// A number that is not believed: the channel cannot have it, or something beside it in the same answer tells against it.
     #[must_use]
     pub fn from_implausible(channel: ChannelId, stamp: Stamp, number: f64) -> Self {
-        Self { channel, stamp, value: Err(Absence::OutOfRange), implausible: Some(number) }
+        Self { implausible: Some(number), ..Self::from_absence(channel, stamp, Absence::OutOfRange) }
     }
 
-    /// A text, which is taken as it is.
+    /// A text, of which at most the first [`TEXT_BYTES_MAX`](crate::text::TEXT_BYTES_MAX) bytes are kept; that it was longer is told by
+    /// [`crate::plausibility`].
     #[must_use]
     pub fn from_text(channel: ChannelId, stamp: Stamp, text: Arc<str>) -> Self {
-        Self { channel, stamp, value: Ok(Value::Text(text)), implausible: None }
+        let kept = limit_text(&text);
+        if kept.len() == text.len() {
+            return Self::from_value(channel, stamp, Ok(Value::Text(text)));
+        }
+        let cut_from_bytes = Some(text.len());
+        Self { cut_from_bytes, ..Self::from_value(channel, stamp, Ok(Value::Text(Arc::from(kept)))) }
+    }
+
+    fn from_value(channel: ChannelId, stamp: Stamp, value: Result<Value, Absence>) -> Self {
+        Self { channel, stamp, value, implausible: None, cut_from_bytes: None }
+    }
+
+    /// How long the text of the device was, bytes, where only its beginning is kept.
+    #[must_use]
+    pub fn cut_from_bytes(&self) -> Option<usize> {
+        self.cut_from_bytes
     }
 
     /// No value, with the reason.
     #[must_use]
     pub fn from_absence(channel: ChannelId, stamp: Stamp, reason: Absence) -> Self {
-        Self { channel, stamp, value: Err(reason), implausible: None }
+        Self::from_value(channel, stamp, Err(reason))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::text::TEXT_BYTES_MAX;
+
+    proptest::proptest! {
+        /// Of every text channel: any text, of any length, with NUL and from right to left.
+        #[test]
+        fn a_text_is_kept_up_to_its_limit(
+            part in "\\PC{1,40}|\\x00{1,9}|[\u{5d0}-\u{5ea}]{1,20}", times in 1_usize..4000, index in 0_usize..64,
+        ) {
+            let texts: Vec<ChannelId> = ChannelId::list_all().filter(|id| id.channel().kind == crate::channel::Kind::Text).collect();
+            let text = part.repeat(times);
+            let reading = Reading::from_text(texts[index % texts.len()], Stamp::from_exact_time(0), text.as_str().into());
+            let value = reading.value.clone().expect("a text");
+            let kept = value.as_text().expect("a text");
+            proptest::prop_assert!(text.starts_with(kept) && kept.len() <= TEXT_BYTES_MAX && kept.len() + 3 >= text.len().min(TEXT_BYTES_MAX));
+            proptest::prop_assert_eq!(reading.cut_from_bytes(), (kept.len() < text.len()).then_some(text.len()));
+        }
+    }
 
     #[test]
     fn every_absence_survives_its_word_and_its_code() {

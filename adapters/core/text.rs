@@ -109,6 +109,23 @@ fn mark_bytes(bytes: &[u8]) -> String {
     text
 }
 
+/// Longest text of a channel, of a fact or of an error, bytes. The longest that a control has for a name, a message or a block is 256
+/// characters; a Chinese one takes three bytes. What a shorter limit would cost is the end of a real message, what a longer one costs
+/// is room in every row of the history.
+pub const TEXT_BYTES_MAX: usize = 768;
+
+/// The beginning of `text` that is at most [`TEXT_BYTES_MAX`] bytes long, up to the end of a character.
+#[must_use]
+pub fn limit_text(text: &str) -> &str {
+    &text[..text.floor_char_boundary(TEXT_BYTES_MAX)]
+}
+
+/// The same for a text that is told and not stored: what was cut off is shown by `...`.
+#[must_use]
+pub fn shorten_text(text: String) -> String {
+    if text.len() <= TEXT_BYTES_MAX { text } else { format!("{}...", limit_text(&text)) }
+}
+
 /// What stands behind the last `/` or `\\` of a path.
 #[must_use]
 pub fn last_part(path: &str) -> &str {

@@ -16,7 +16,7 @@ mod tests;
 pub use stats::{Spread, WorkerState, WorkerStats};
 
 use crate::clock::{Clock, SECOND_NS, TimeNs};
-use crate::driver::{Source, SourceError};
+use crate::driver::{Source, SourceError, SourceProblem};
 use crate::merge::{Merge, SourceId};
 use crate::plausibility::Plausibility;
 use crate::reading::Reading;
@@ -259,7 +259,8 @@ impl Poller {
     /// A source that does not answer has an error instead.
     fn take_problems(&mut self, answers: bool) {
         let problems = if answers {
-            self.source.list_problems().into_iter().chain(self.plausibility.list_problems()).collect()
+            let of_source = self.source.list_problems().into_iter().map(SourceProblem::with_short_texts);
+            of_source.chain(self.plausibility.list_problems()).collect()
         } else {
             Vec::new()
         };
@@ -275,7 +276,8 @@ impl Poller {
         locked(&self.shared.counters).poll_began(began_ns);
         let read = AssertUnwindSafe(|| self.source.read(self.clock.as_ref(), &mut readings));
         let result = catch_unwind(read).unwrap_or_else(|_| Err(panicked(self.source.name())));
-        (began_ns, Poll { ended_ns: self.clock.now_ns(), readings, error: result.err() })
+        let error = result.err().map(SourceError::with_short_texts);
+        (began_ns, Poll { ended_ns: self.clock.now_ns(), readings, error })
     }
 
     /// The next beat after `ended_ns`, or the end of the pause after a failure.

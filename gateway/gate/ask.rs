@@ -6,7 +6,6 @@
 //! box. A limit that chatters therefore stops the machine once and not fifty times. A request of its own (a second worn edge) that was
 //! held back by the latch of another passes when that has been seen to, if a script still asks for it.
 
-use super::find_channel;
 use adapter_core::words::execution;
 use adapter_core::{ChannelId, LadderRequest, Sample};
 use rules::script::{Stop, StopRequest};
@@ -68,6 +67,7 @@ struct StandingRequest {
     /// It waits until the one that is latched has been seen to.
     waits: bool,
 }
+const EXECUTION: ChannelId = ChannelId::named("execution");
 
 /// One kind of request.
 #[derive(Debug, Clone, Default)]
@@ -131,7 +131,6 @@ fn is_same_request(request: LadderRequest, reason: &str, other: &str) -> bool {
 #[derive(Debug)]
 pub(super) struct Asks {
     latches: [Latch; 2],
-    execution: Option<ChannelId>,
     /// The machine has been in feed hold, has stood, since it last ran.
     held: bool,
     stood: bool,
@@ -139,7 +138,7 @@ pub(super) struct Asks {
 
 impl Asks {
     pub(super) fn new() -> Self {
-        Self { latches: Default::default(), execution: find_channel("execution"), held: false, stood: false }
+        Self { latches: Default::default(), held: false, stood: false }
     }
 
     pub(super) fn judge_requests(
@@ -163,7 +162,7 @@ impl Asks {
 
     /// The operator has started again after a feed hold, or after the program stood.
     fn seen_to(&mut self, sample: &Sample) {
-        let Some(word) = self.execution.and_then(|id| sample.text(id)) else { return };
+        let Some(word) = sample.text(EXECUTION) else { return };
         self.held |= word == execution::FEED_HOLD;
         self.stood |= word == execution::STOPPED;
         if word != execution::ACTIVE {

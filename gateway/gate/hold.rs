@@ -1,6 +1,5 @@
 //! The reasons that hold 100 %, whatever a script asks for.
 
-use super::find_channel;
 use super::thread_cycle::ThreadCycle;
 use adapter_core::words::{execution, mode, of_channel, operation};
 use adapter_core::{Absence, ChannelId, Sample};
@@ -103,44 +102,43 @@ impl fmt::Display for Hold {
     }
 }
 
-/// The channels that are looked at, and what NC blocks have said about threads.
+const MODE: ChannelId = ChannelId::named("mode");
+const EXECUTION: ChannelId = ChannelId::named("execution");
+const FEED: ChannelId = ChannelId::named("feed_mm_min");
+const SPEED: ChannelId = ChannelId::named("spindle_speed_rpm");
+const ALARM: ChannelId = ChannelId::named("alarm");
+const RAPID: ChannelId = ChannelId::named("rapid");
+const SINGLE_BLOCK: ChannelId = ChannelId::named("single_block");
+const DRY_RUN: ChannelId = ChannelId::named("dry_run");
+const OPERATION: ChannelId = ChannelId::named("operation");
+const BLOCK: ChannelId = ChannelId::named("block");
+
+/// Without a fresh value of each of these nothing is known of the machine.
+const NEEDED: [ChannelId; 4] = [MODE, EXECUTION, FEED, SPEED];
+/// A controller may not have these at all; one that has them and is silent is another matter.
+const OPTIONAL: [ChannelId; 5] = [ALARM, RAPID, OPERATION, SINGLE_BLOCK, DRY_RUN];
+/// One of these has to be measured.
+const LOADS: [ChannelId; 3] =
+    [ChannelId::named("spindle_power_w"), ChannelId::named("spindle_current_a"), ChannelId::named("spindle_load_pct")];
+/// Switches of the operator that hold while they are on.
+const SWITCHES: [(ChannelId, Hold); 2] = [(SINGLE_BLOCK, Hold::SingleBlock), (DRY_RUN, Hold::DryRun)];
+
+/// What NC blocks have said about threads, and how old a value may be. The channels are constants: one that the table does not have
+/// does not compile, so no interlock can lose its channel.
 #[derive(Debug)]
 pub(super) struct Interlocks {
     stale_ns: i64,
-    mode: Option<ChannelId>,
-    execution: Option<ChannelId>,
-    feed: Option<ChannelId>,
-    speed: Option<ChannelId>,
-    alarm: Option<ChannelId>,
-    rapid: Option<ChannelId>,
-    switches: [(Option<ChannelId>, Hold); 2],
-    operation: Option<ChannelId>,
-    block: Option<ChannelId>,
-    loads: [Option<ChannelId>; 3],
     cycle: ThreadCycle,
 }
 
 impl Interlocks {
     pub(super) fn new(stale_ns: i64) -> Self {
-        Self {
-            stale_ns,
-            mode: find_channel("mode"),
-            execution: find_channel("execution"),
-            feed: find_channel("feed_mm_min"),
-            speed: find_channel("spindle_speed_rpm"),
-            alarm: find_channel("alarm"),
-            rapid: find_channel("rapid"),
-            switches: [(find_channel("single_block"), Hold::SingleBlock), (find_channel("dry_run"), Hold::DryRun)],
-            operation: find_channel("operation"),
-            block: find_channel("block"),
-            loads: ["spindle_power_w", "spindle_current_a", "spindle_load_pct"].map(find_channel),
-            cycle: ThreadCycle::default(),
-        }
+        Self { stale_ns, cycle: ThreadCycle::default() }
     }
 
     /// The first reason, or none. Called at every tick: it also follows the NC blocks.
     pub(super) fn find_hold(&mut self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
-        if let Some(block) = self.block.and_then(|block| sample.text(block)) {
+        if let Some(block) = sample.text(BLOCK) {
             self.cycle.follow_block(block);
         }
         self.find_thread_hold(sample)
@@ -151,7 +149,7 @@ impl Interlocks {
 
     /// Threads come first: there a change of the feed spoils the part even when everything else is well.
     fn find_thread_hold(&self, sample: &Sample) -> Option<Hold> {
-        let operation = self.operation.and_then(|operation| sample.text(operation)).unwrap_or_default();
+        let operation = sample.text(OPERATION).unwrap_or_default();
         if operation.eq_ignore_ascii_case(operation::THREADING) {
             return Some(Hold::Threading);
         }
@@ -162,20 +160,16 @@ impl Interlocks {
     }
 
     fn find_data_hold(&self, sample: &Sample) -> Option<Hold> {
-        let needed = [self.mode, self.execution, self.feed, self.speed];
-        let missing = needed.into_iter().flatten().find_map(|id| self.find_absence(sample, id).map(|why| (id, why)));
-        if let Some((id, why)) = missing {
+        let find_missing = |id| self.find_absence(sample, id).map(|why| (id, why));
+        if let Some((id, why)) = NEEDED.into_iter().find_map(find_missing) {
             return Some(Hold::Missing(id, why));
         }
-        let switches = self.switches.map(|(id, _)| id);
-        let optional = [self.alarm, self.rapid, self.operation].into_iter().chain(switches).flatten();
-        let silent = optional.filter_map(|id| self.find_absence(sample, id).map(|why| (id, why)));
-        // A controller may not have these at all; one that has them and is silent is another matter.
+        let silent = OPTIONAL.into_iter().filter_map(find_missing);
         let mut silent = silent.filter(|(_, why)| !matches!(why, Absence::NotProvided | Absence::NotSupported));
         if let Some((id, why)) = silent.next() {
             return Some(Hold::Missing(id, why));
         }
-        let measured = self.loads.into_iter().flatten().any(|id| self.find_absence(sample, id).is_none());
+        let measured = LOADS.into_iter().any(|id| self.find_absence(sample, id).is_none());
         (!measured).then_some(Hold::OnlyEstimated)
     }
 
@@ -196,36 +190,33 @@ impl Interlocks {
 
     /// What stands in the way of moving an offset; nothing between two programs. Call it after [`Interlocks::find_hold`].
     pub(super) fn between_programs(&self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
-        let needed = [self.mode, self.execution].into_iter().flatten();
-        let missing = needed.chain(self.alarm).find_map(|id| self.find_absence(sample, id).map(|why| (id, why)));
+        let needed = [MODE, EXECUTION, ALARM];
+        let missing = needed.into_iter().find_map(|id| self.find_absence(sample, id).map(|why| (id, why)));
         if let Some((id, why)) = missing {
             return Some(Hold::Missing(id, why));
         }
         let rests = [execution::READY, execution::PROGRAM_COMPLETED];
-        self.find_mode_hold(sample).or_else(|| {
-            match self.execution.and_then(|id| sample.text(id)).unwrap_or_default() {
-                _ if estimates.state == State::Unknown => Some(Hold::StateUnknown),
-                word if rests.contains(&word) => None,
-                execution::FEED_HOLD => Some(Hold::FeedHold),
-                word if execution::ALL.contains(&word) => Some(Hold::Running),
-                _ => self.execution.map(Hold::UnknownWord),
-            }
+        self.find_mode_hold(sample).or_else(|| match sample.text(EXECUTION).unwrap_or_default() {
+            _ if estimates.state == State::Unknown => Some(Hold::StateUnknown),
+            word if rests.contains(&word) => None,
+            execution::FEED_HOLD => Some(Hold::FeedHold),
+            word if execution::ALL.contains(&word) => Some(Hold::Running),
+            _ => Some(Hold::UnknownWord(EXECUTION)),
         })
     }
 
     /// No alarm, and automatic.
     fn find_mode_hold(&self, sample: &Sample) -> Option<Hold> {
-        let text = |id: Option<ChannelId>| id.and_then(|id| sample.text(id)).unwrap_or_default();
-        if !text(self.alarm).is_empty() {
+        if !sample.text(ALARM).unwrap_or_default().is_empty() {
             return Some(Hold::Alarm);
         }
-        match text(self.mode) {
+        match sample.text(MODE).unwrap_or_default() {
             mode::AUTOMATIC => None,
             mode::SEMI_AUTOMATIC => Some(Hold::SingleBlock),
             mode::MANUAL_DATA_INPUT => Some(Hold::Mdi),
             mode::MANUAL => Some(Hold::Manual),
             mode::EDIT => Some(Hold::NotAutomatic),
-            _ => self.mode.map(Hold::UnknownWord),
+            _ => Some(Hold::UnknownWord(MODE)),
         }
     }
 
@@ -233,21 +224,20 @@ impl Interlocks {
         if let Some(hold) = self.find_mode_hold(sample) {
             return Some(hold);
         }
-        let text = |id: Option<ChannelId>| id.and_then(|id| sample.text(id)).unwrap_or_default();
-        let on = |id: Option<ChannelId>| id.and_then(|id| sample.number(id).ok()).is_some_and(|flag| flag > 0.0);
-        if let Some((_, hold)) = self.switches.iter().find(|(id, _)| on(*id)) {
-            return Some(*hold);
+        let is_on = |id: ChannelId| sample.number(id).is_ok_and(|flag| flag > 0.0);
+        if let Some((_, hold)) = SWITCHES.into_iter().find(|(id, _)| is_on(*id)) {
+            return Some(hold);
         }
-        match text(self.execution) {
+        match sample.text(EXECUTION).unwrap_or_default() {
             execution::ACTIVE => None,
             execution::FEED_HOLD => Some(Hold::FeedHold),
             word if execution::ALL.contains(&word) => Some(Hold::NotRunning),
-            _ => self.execution.map(Hold::UnknownWord),
+            _ => Some(Hold::UnknownWord(EXECUTION)),
         }
     }
 
     fn find_motion_hold(&self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
-        let rapid = self.rapid.and_then(|id| sample.number(id).ok()).is_some_and(|flag| flag > 0.0);
+        let rapid = sample.number(RAPID).is_ok_and(|flag| flag > 0.0);
         match estimates.state {
             State::Unknown => Some(Hold::StateUnknown),
             State::Rapid => Some(Hold::Rapid),

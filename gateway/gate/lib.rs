@@ -62,7 +62,6 @@ use std::time::Duration;
 pub struct Gate {
     limits: GateConfig,
     interlocks: Interlocks,
-    dial: Option<ChannelId>,
     aim: Aim,
     slew: Slew,
     arming: Arming,
@@ -81,7 +80,6 @@ impl Gate {
         let stale_ns = saturate_to_ns(limits.stale);
         Self {
             interlocks: Interlocks::new(stale_ns),
-            dial: find_channel("feed_override_dial_pct"),
             aim: Aim::new(limits.dead_band_pct),
             slew: Slew::new(limits.slew_up_pct_per_s, limits.slew_down_pct_per_s),
             arming: Arming::new(limits.greatest_mode(), limits.armed_for),
@@ -242,8 +240,10 @@ impl Gate {
     /// The dial, where it is known and the ladder takes the lesser one of dial and override: at and below it there is nothing
     /// to ask for.
     fn lesser_dial_pct(&self, sample: &Sample) -> Option<f64> {
-        let dial = self.dial.filter(|_| !self.limits.above_dial)?;
-        self.interlocks.fresh_number(sample, dial)
+        if self.limits.above_dial {
+            return None;
+        }
+        self.interlocks.fresh_number(sample, DIAL)
     }
 
     /// What the ladder's rule and the operator's dial leave: a ladder that takes the lesser one of dial and override makes
@@ -252,15 +252,12 @@ impl Gate {
         if self.limits.above_dial {
             return self.limits.max_pct;
         }
-        let dial_pct = self.dial.and_then(|dial| self.interlocks.fresh_number(sample, dial));
+        let dial_pct = self.interlocks.fresh_number(sample, DIAL);
         dial_pct.unwrap_or(100.0).clamp(100.0, 254.0)
     }
 }
 
-/// A channel of the table that the gate cannot do without.
-fn find_channel(name: &str) -> Option<ChannelId> {
-    ChannelId::from_name(name)
-}
+const DIAL: ChannelId = ChannelId::named("feed_override_dial_pct");
 
 /// The longest time between two decisions over which the slew limit still counts; after more, it begins at 100 %.
 const PAUSE_NS: i64 = SECOND_NS;

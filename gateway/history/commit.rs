@@ -128,8 +128,7 @@ fn put_tail(db: &Connection, minute_buffer: &MinuteBuffer, slots: &mut TailSlots
         }
         let slot =
             slots.take_spare(minute_buffer.open_row(), minute_buffer.next_row).unwrap_or_else(|| slots.new_slot());
-        let padded = body.len().next_multiple_of(ENTRY_STEP);
-        insert_tail(db, minute_buffer, slot, from..from + count, &format!("{body:padded$}"))?;
+        insert_tail(db, minute_buffer, slot, from..from + count, &pad_entry(body))?;
         from += count;
         slots.used.push_back(TailEntry { slot, end_row: minute_buffer.open_row() + from as i64 });
     }
@@ -139,6 +138,13 @@ fn put_tail(db: &Connection, minute_buffer: &MinuteBuffer, slots: &mut TailSlots
             .with_activity("shortening the crash tail")?;
     }
     Ok(())
+}
+
+/// Blanks up to the next multiple of the step. Not by the width of a format, which ends the thread beyond 65,535.
+fn pad_entry(mut body: String) -> String {
+    let blanks = body.len().next_multiple_of(ENTRY_STEP) - body.len();
+    body.extend(std::iter::repeat_n(' ', blanks));
+    body
 }
 
 /// Stores a fresh block and its summaries.

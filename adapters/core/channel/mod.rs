@@ -5,15 +5,15 @@
 mod declarations;
 mod details;
 mod form;
+mod id;
 mod paths;
 pub mod quantity;
 pub mod unit;
 
 pub use declarations::{DECLARED_MAX, DeclareError, NewChannel, declare_channel};
 pub use form::Form;
+pub use id::ChannelId;
 pub use paths::{PATHS, on_path};
-
-use std::fmt;
 
 /// How a channel behaves between two readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,8 +96,12 @@ pub static CHANNELS: &[Channel] = &ALL;
 
 const PATH_ROWS: &[Channel] = paths::FURTHER.as_flattened();
 
-static ALL: [Channel; FIRST.len() + PATH_ROWS.len() + details::LATER.len()] = {
-    let mut all = [FIRST[0]; FIRST.len() + PATH_ROWS.len() + details::LATER.len()];
+static ALL: [Channel; COUNT] = TABLE;
+
+const COUNT: usize = FIRST.len() + PATH_ROWS.len() + details::LATER.len();
+
+const TABLE: [Channel; COUNT] = {
+    let mut all = [FIRST[0]; COUNT];
     let mut index = 0;
     while index < all.len() {
         let behind = FIRST.len() + PATH_ROWS.len();
@@ -298,64 +302,6 @@ const FIRST: &[Channel] = &[
     flag(number("dry_run", "1", (0.0, 1.0), Kind::Held, "Dry run is switched on", "空运行开关")),
     number("torque_nm", "N·m", (-100000.0, 100000.0), Kind::Continuous, "Torque at the spindle", "主轴扭矩"),
 ];
-
-/// Index into [`CHANNELS`], and behind them into what a configuration has declared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ChannelId(u16);
-
-impl ChannelId {
-    /// How many channels there are. It grows while a configuration is read; whoever keeps something per channel looks
-    /// once, and meets a later channel as one that is not there.
-    #[must_use]
-    pub fn count_channels() -> usize {
-        CHANNELS.len() + declarations::count_declared()
-    }
-
-    /// The channel of this name. A linear search: look names up once, not in a loop.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
-        let known = CHANNELS.iter().position(|channel| channel.name == name);
-        let index = known.or_else(|| declarations::find_by_name(name).map(|place| CHANNELS.len() + place))?;
-        u16::try_from(index).ok().map(Self)
-    }
-
-    /// The channel at this position of the table.
-    #[must_use]
-    pub fn from_index(index: usize) -> Option<Self> {
-        (index < Self::count_channels()).then_some(index).and_then(|index| u16::try_from(index).ok()).map(Self)
-    }
-
-    /// Every channel, in the order of the table.
-    pub fn list_all() -> impl Iterator<Item = Self> {
-        (0..Self::count_channels()).filter_map(|index| u16::try_from(index).ok().map(Self))
-    }
-
-    /// Position in the table.
-    #[must_use]
-    pub fn index(self) -> usize {
-        usize::from(self.0)
-    }
-
-    /// The row of the table.
-    #[must_use]
-    pub fn channel(self) -> &'static Channel {
-        let index = usize::from(self.0);
-        // An id is only made of a row that is there, and no row is ever taken away.
-        CHANNELS.get(index).or_else(|| declarations::find_by_index(index - CHANNELS.len())).unwrap_or(&CHANNELS[0])
-    }
-
-    /// The name of the channel in the table, which is its name everywhere.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        self.channel().name
-    }
-}
-
-impl fmt::Display for ChannelId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
 
 /// The name of the table nearest to `name`, for "did you mean".
 #[must_use]
