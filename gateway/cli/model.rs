@@ -127,7 +127,7 @@ fn check_model(path: &Path, recordings: &[String], map: Option<&PathBuf>) -> Com
     let examination = twin::examine_recording(&given.recording, &model);
     let (rows, runs) = (given.recording.count_rows(), given.recording.list_runs().len());
     print_text(pick_text(&format!("{rows} rows in {runs} runs\n"), &format!("{rows}行，{runs}个批次\n")));
-    if let Ok(simulation) = simulation::run(&given.recording, &model)
+    if let Ok(simulation) = simulation::run(&given.recording, &model, false)
         && let Some((rmse, rows)) = simulation.rmse()
     {
         let (error, unit) = (format_short_number(rmse), find_output_unit(&model.output));

@@ -22,6 +22,9 @@ pub(super) struct SimulateArguments {
     /// Print JSON.
     #[arg(long)]
     json: bool,
+    /// Do not follow hidden states (a pump that nobody records) from earlier rows of the recorded output.
+    #[arg(long)]
+    blind: bool,
     /// Let the simulated machine carry out a plan in place of a model: lathe, mill, or lathe?wear_mm=0.2&seed=3.
     #[arg(long, value_name = "MACHINE", requires_all = ["plan", "out"], conflicts_with_all = ["model", "recording", "rows"])]
     machine: Option<String>,
@@ -60,7 +63,7 @@ fn simulate_model(path: &Path, arguments: &SimulateArguments) -> CommandResult {
     let given = read_recordings(&arguments.recording).map_err(|wrong| problems.extend(wrong));
     let (Ok(model), Ok(given)) = (model, given) else { return Err(cannot_use(&problems)) };
     given.warnings.iter().for_each(|warning| eprintln!("{warning}"));
-    let simulation = simulation::run(&given.recording, &model).map_err(|all| cannot_use(&all))?;
+    let simulation = simulation::run(&given.recording, &model, arguments.blind).map_err(|all| cannot_use(&all))?;
     if let Some(path) = &arguments.rows {
         write_output(path, &simulation.rows_csv(&given.recording)).map_err(CannotRun::from_error)?;
     }

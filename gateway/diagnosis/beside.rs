@@ -72,7 +72,7 @@ pub type Onset = (Regime, TimeNs);
 /// Every kind of work that the stretch holds enough of.
 #[must_use]
 pub fn beside_model(recording: &Recording, model: &Model, found: &Diagnosis, onsets: &[Onset]) -> Vec<BesideModel> {
-    let Ok(simulated) = simulation::run(recording, model) else { return Vec::new() };
+    let Ok(simulated) = simulation::run(recording, model, false) else { return Vec::new() };
     let rows = compare_rows(recording, &found.output, simulated.total(), found);
     let moved = moved_parameters(model, found);
     let start_ns = recording.start_ns.unwrap_or(0);

@@ -1,11 +1,10 @@
 //! A model over the inputs of a recording, and how far it is from what was recorded.
 
 use recording::Recording;
-use recording::{Cells, Numbers};
-use rules::physics::Scene;
 use rules::twin::diagnosis::find_output_unit;
 use rules::twin::text_report::format_short_number;
-use rules::twin::{Model, bind::bind_model, inputs::mark_rows_with_inputs, simulate_parts};
+use rules::twin::Model;
+use rules::twin::simulate::{SimulatedRows, simulate_recording};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
@@ -25,28 +24,9 @@ pub struct Simulation {
 ///
 /// # Errors
 /// Everything the model needs and the recording lacks.
-pub fn run(recording: &Recording, model: &Model) -> Result<Simulation, Vec<String>> {
-    let recorded: Option<Vec<Option<f64>>> =
-        recording.find_numbers(&model.output).map(|numbers| numbers.iter().collect());
-    let mut complete = recording.clone();
-    if recorded.is_none() {
-        complete.set_column(&model.output, Cells::Numbers(Numbers::default()));
-    }
-    let mut scene = Scene::new(&complete, &model.output, &model.roles).map_err(|error| vec![error.to_string()])?;
-    let parts = bind_model(model, &scene)?;
-    let known = mark_rows_with_inputs(&scene, &parts);
-    let Some(simulated) = simulate_parts(&parts, &mut scene) else {
-        return Err(vec!["the model cannot be simulated over this recording".to_owned()]);
-    };
-    let total = simulated.total.into_iter().zip(&known).map(|(x, known)| known.then_some(x)).collect();
-    let labels = parts.iter().map(|part| part.label().to_owned());
-    Ok(Simulation {
-        output: model.output.clone(),
-        name: model.name.clone(),
-        total,
-        parts: labels.zip(simulated.contributions).collect(),
-        recorded: recorded.unwrap_or_else(|| vec![None; recording.count_rows()]),
-    })
+pub fn run(recording: &Recording, model: &Model, blind: bool) -> Result<Simulation, Vec<String>> {
+    let SimulatedRows { total, parts, recorded } = simulate_recording(recording, model, blind)?;
+    Ok(Simulation { output: model.output.clone(), name: model.name.clone(), total, parts, recorded })
 }
 
 impl Simulation {

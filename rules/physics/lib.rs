@@ -12,6 +12,7 @@ pub mod explain;
 mod scene;
 pub mod state;
 mod tool_load;
+pub mod two_levels;
 mod unit;
 
 use adapter_core::channel::quantity::Quantity;
@@ -227,6 +228,12 @@ pub trait Effect: Sync + Send {
     /// Does a hidden state (how worn this tool is, a pump on or off, which lot) belong to a tool, lot or stretch, so
     /// that it must be followed through a held-out run?
     fn has_hidden_state(&self) -> bool {
+        false
+    }
+
+    /// Is this form a state that nobody records, which is followed from what everything else leaves of the recorded output in
+    /// earlier rows of a run?
+    fn is_followed(&self, _form: &Form) -> bool {
         false
     }
 }

@@ -86,6 +86,10 @@ fn describe_channels(need: &str) -> String {
 fn describe_missing_input(part: &Part, scene: &Scene) -> String {
     let place = format!("{} (line {})", part.label(), part.line);
     let unknown = |name: &&str| super::channel::read_channel_values(scene, name).is_none();
+    let over: Vec<&str> = part.departures.iter().map(|departure| departure.over.as_str()).filter(unknown).collect();
+    if !over.is_empty() {
+        return format!("{place} departs from its law over {}: record it", over.join(", "));
+    }
     let absent = part.inputs().into_iter().filter(unknown).collect::<Vec<_>>().join(", ");
     match &part.body {
         PartFunction::Linear(_) => format!("{place} needs the columns {absent}: record them"),

@@ -50,10 +50,10 @@ pub struct ParameterEstimate {
     pub name: String,
     /// Fitted value, in `unit`.
     pub value: f64,
-    /// Lower end of the 95 % interval.
-    pub low: f64,
-    /// Upper end of the 95 % interval.
-    pub high: f64,
+    /// Lower end of the 95 % interval; `None` where none was computed.
+    pub low: Option<f64>,
+    /// Upper end of the 95 % interval; `None` where none was computed.
+    pub high: Option<f64>,
     /// Unit symbol of value and interval.
     pub unit: String,
 }
@@ -69,14 +69,16 @@ pub struct Missing {
     pub equation: String,
     /// Its parameters as fitted, with intervals.
     pub parameters: Vec<ParameterEstimate>,
-    /// Information lost without it.
-    pub delta_ic: f64,
-    /// Chance that noise alone does as well, over the whole search.
-    pub p_value: f64,
-    /// Root mean square error on held-out runs without it.
+    /// Information lost without this one, all others refitted; `None` of what was not fitted.
+    pub delta_ic: Option<f64>,
+    /// Probability of the name, averaged over resamples of the recording; `None` of what has no name.
+    pub probability: Option<f64>,
+    /// Root mean square error on held-out runs without this one, all others refitted.
     pub held_out_rmse_before: Option<f64>,
     /// The same with it.
     pub held_out_rmse_after: Option<f64>,
+    /// Why it cannot be simulated ahead; `None` where it can.
+    pub not_predictable: Option<Bilingual>,
     /// Share of its variance that the baseline had swallowed.
     pub absorbed_share: f64,
 }
@@ -138,8 +140,10 @@ pub struct Fits {
     pub noise_floor: f64,
     /// The model refitted without the missing physics.
     pub before: Quality,
-    /// The model refitted with it.
+    /// The model refitted with it, as it is written: what the file does.
     pub after: Quality,
+    /// A free curve in its place, which no law could beat; `None` where nothing was found.
+    pub ceiling: Option<Quality>,
 }
 
 impl Fits {
@@ -157,8 +161,6 @@ pub struct Experiment {
     pub statement: String,
     /// How long it takes.
     pub minutes: f64,
-    /// Information it is expected to bring between the best explanations.
-    pub expected_delta_ic: f64,
     /// The kind whose separating experiment it is.
     pub effect: String,
 }

@@ -5,11 +5,18 @@
 
 use super::linear::{dot, least_squares};
 use super::model::{Part, Simulated, simulate_changed_part, simulate_parts};
-use numerics::statistics::rms;
+use numerics::statistics::{count_to_f64, rms};
 use physics::{Entry, Scene};
 
-/// Gauss-Newton steps at most.
+/// Gauss-Newton steps at most, of a fit without bounds and of one with: what rests at a bound and leaves it again takes more.
 const STEPS_MAX: usize = 12;
+const BOUNDED_STEPS_MAX: usize = 40;
+/// Dampings (Marquardt, J. SIAM 11, 1963) of a bounded fit, as shares of each column's square, that are tried where no share
+/// of the whole step lowers the error: two lags that explain one delay have a valley that a plain step leaps across.
+const DAMPINGS: [f64; 4] = [0.0, 0.003, 0.1, 3.0];
+/// Share of its size over all rows that a column must have in the rows that are fitted, so that they tell its coefficient: an
+/// initial state that has faded there would be fitted to anything.
+const SEEN: f64 = 1e-6;
 /// Share of the sum of squares below which nothing improves any more.
 const AT_REST: f64 = 1e-10;
 /// Share of its value by which a shape may move in one step.
@@ -58,11 +65,28 @@ pub(super) fn fit_parts(scene: &mut Scene, parts: &[Part], metric: &Metric<'_>) 
         parts.iter_mut().for_each(clamp_to_range);
     }
     let mut simulated = simulate_parts(&parts, scene)?;
-    let mut error = sum_residual_squares(metric, &simulated.total);
-    for _ in 0..STEPS_MAX {
+    let left = compute_weighted_residual(metric, &simulated.total);
+    // What keeps a departure near zero counts in deviations of an innovation.
+    let ridge = dot(&left, &left) / count_to_f64(left.len().max(1));
+    let sum = |parts: &[Part], total: &[f64]| {
+        let left = compute_weighted_residual(metric, total);
+        dot(&left, &left) + ridge * sum_prior_squares(parts, &free)
+    };
+    let mut error = sum(&parts, &simulated.total);
+    let (steps_max, dampings) =
+        if metric.bounded { (BOUNDED_STEPS_MAX, &DAMPINGS[..]) } else { (STEPS_MAX, &DAMPINGS[..1]) };
+    for _ in 0..steps_max {
         let tangents = compute_tangents(scene, &parts, &free, &simulated)?;
-        let step = solve_gauss_newton_step(&parts, &free, metric, &simulated.total, &tangents);
-        let Some((moved, total, less)) = search_step_length(scene, &parts, &free, &step, metric, error)? else { break };
+        let linear = Linearised::new(&parts, &free, metric, (&simulated.total, &tangents), ridge);
+        let mut found = None;
+        for damping in dampings {
+            let step = linear.solve_step(*damping);
+            found = search_step_length(scene, &parts, &free, &step, metric, (error, &sum))?;
+            if found.is_some() {
+                break;
+            }
+        }
+        let Some((moved, total, less)) = found else { break };
         let gained = error - less;
         (parts, simulated, error) = (moved, total, less);
         if gained <= AT_REST * error {
@@ -97,39 +121,81 @@ fn compute_weighted_residual(metric: &Metric<'_>, total: &[f64]) -> Vec<f64> {
     (metric.weigh)(&left)
 }
 
-fn sum_residual_squares(metric: &Metric<'_>, total: &[f64]) -> f64 {
-    let left = compute_weighted_residual(metric, total);
-    dot(&left, &left)
+/// Sum of the squared deviations of departures from none, in those that are usual.
+fn sum_prior_squares(parts: &[Part], free: &[Free]) -> f64 {
+    let of = |free: &Free| {
+        let parameter = &parts[free.part].parameters[free.parameter];
+        parameter.prior_deviation().map_or(0.0, |deviation| (parameter.value / deviation).powi(2))
+    };
+    free.iter().map(of).sum()
 }
 
-/// The step to the least error if everything were proportional; parameters that stand at the end of their range and would
-/// leave it rest.
-fn solve_gauss_newton_step(
-    parts: &[Part],
-    free: &[Free],
-    metric: &Metric<'_>,
-    total: &[f64],
-    tangents: &[Vec<f64>],
-) -> Vec<f64> {
-    let left = compute_weighted_residual(metric, total);
-    let mut columns: Vec<Vec<f64>> = tangents.iter().map(|tangent| (metric.weigh)(tangent)).collect();
-    let sizes: Vec<f64> = columns.iter().map(|column| rms(column).max(f64::MIN_POSITIVE)).collect();
-    columns.iter_mut().zip(&sizes).for_each(|(column, size)| column.iter_mut().for_each(|x| *x /= size));
-    let mut resting = vec![false; free.len()];
-    loop {
-        let solved = least_squares(&columns, &left).coefficients;
-        let steps: Vec<f64> = solved.iter().zip(&sizes).map(|(step, size)| step / size).collect();
-        let leaves = |index: usize| {
-            let parameter = &parts[free[index].part].parameters[free[index].parameter];
-            let (low, high) = parameter.range;
-            let held = metric.bounded || parameter.entry == Entry::Shape;
-            let outwards =
-                parameter.value <= low && steps[index] < 0.0 || parameter.value >= high && steps[index] > 0.0;
-            held && !resting[index] && outwards
-        };
-        let Some(index) = (0..free.len()).find(|index| leaves(*index)) else { return steps };
-        resting[index] = true;
-        columns[index].fill(0.0);
+/// A model as it is near some values: what is left, and what each free parameter changes, in the metric; each column of size one.
+struct Linearised<'a> {
+    parts: &'a [Part],
+    free: &'a [Free],
+    bounded: bool,
+    left: Vec<f64>,
+    columns: Vec<Vec<f64>>,
+    sizes: Vec<f64>,
+}
+
+impl<'a> Linearised<'a> {
+    fn new(
+        parts: &'a [Part],
+        free: &'a [Free],
+        metric: &Metric<'_>,
+        (total, tangents): (&[f64], &[Vec<f64>]),
+        ridge: f64,
+    ) -> Self {
+        let mut left = compute_weighted_residual(metric, total);
+        let mut columns: Vec<Vec<f64>> = tangents.iter().map(|tangent| (metric.weigh)(tangent)).collect();
+        let rows = left.len();
+        for (index, at) in free.iter().enumerate() {
+            let parameter = &parts[at.part].parameters[at.parameter];
+            let Some(deviation) = parameter.prior_deviation() else { continue };
+            let weight = ridge.sqrt() / deviation;
+            left.push(-weight * parameter.value);
+            columns.iter_mut().enumerate().for_each(|(other, c)| c.push(if other == index { weight } else { 0.0 }));
+        }
+        let sizes: Vec<f64> = columns.iter().map(|column| rms(&column[..rows]).max(f64::MIN_POSITIVE)).collect();
+        for ((column, size), tangent) in columns.iter_mut().zip(&sizes).zip(tangents) {
+            let unseen = metric.bounded && *size < SEEN * rms(tangent);
+            column.iter_mut().for_each(|x| *x = if unseen { 0.0 } else { *x / size });
+        }
+        Self { parts, free, bounded: metric.bounded, left, columns, sizes }
+    }
+
+    /// The step to the least error if everything were proportional, damped; parameters that stand at the end of their range and
+    /// would leave it rest, and go on where another that rests makes them turn back.
+    fn solve_step(&self, damping: f64) -> Vec<f64> {
+        let (mut columns, mut left) = (self.columns.clone(), self.left.clone());
+        if damping > 0.0 {
+            let own = (damping * count_to_f64(left.len())).sqrt();
+            left.resize(left.len() + self.free.len(), 0.0);
+            for (index, column) in columns.iter_mut().enumerate() {
+                column.extend((0..self.free.len()).map(|other| if other == index { own } else { 0.0 }));
+            }
+        }
+        let mut resting = vec![false; self.free.len()];
+        loop {
+            let solved = least_squares(&columns, &left).coefficients;
+            let steps: Vec<f64> = solved.iter().zip(&self.sizes).map(|(step, size)| step / size).collect();
+            let Some(index) = (0..self.free.len()).find(|index| !resting[*index] && self.leaves_range(*index, steps[*index]))
+            else {
+                return steps;
+            };
+            resting[index] = true;
+            columns[index].fill(0.0);
+        }
+    }
+
+    /// Does a parameter stand at the end of its range, and would it leave it with this step?
+    fn leaves_range(&self, index: usize, step: f64) -> bool {
+        let parameter = &self.parts[self.free[index].part].parameters[self.free[index].parameter];
+        let (low, high) = parameter.range;
+        let held = self.bounded || parameter.entry == Entry::Shape;
+        held && (parameter.value <= low && step < 0.0 || parameter.value >= high && step > 0.0)
     }
 }
 
@@ -143,7 +209,7 @@ fn search_step_length(
     free: &[Free],
     step: &[f64],
     metric: &Metric<'_>,
-    error: f64,
+    (error, sum): (f64, &dyn Fn(&[Part], &[f64]) -> f64),
 ) -> Option<Option<Moved>> {
     for share in SHARES {
         let mut moved = parts.to_vec();
@@ -162,7 +228,7 @@ fn search_step_length(
             }
         }
         let simulated = simulate_parts(&moved, scene)?;
-        let less = sum_residual_squares(metric, &simulated.total);
+        let less = sum(&moved, &simulated.total);
         if less < error {
             return Some(Some((moved, simulated, less)));
         }

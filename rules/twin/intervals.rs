@@ -89,8 +89,8 @@ impl FittedRows<'_> {
                 ParameterEstimate {
                     name: parameter.name.clone(),
                     value: parameter.value,
-                    low: low.max(parameter.range.0),
-                    high: high.min(parameter.range.1),
+                    low: Some(low.max(parameter.range.0)),
+                    high: Some(high.min(parameter.range.1)),
                     unit: resolve_unit(&parameter.unit, self.scene),
                 }
             })

@@ -62,6 +62,7 @@ fn encode_fits(fits: &Fits) -> Value {
         "noise_floor": encode_number(fits.noise_floor),
         "before": quality(&fits.before),
         "after": quality(&fits.after),
+        "ceiling": fits.ceiling.as_ref().map(quality),
     })
 }
 
@@ -100,16 +101,18 @@ fn encode_missing(missing: &Missing) -> Value {
         "statement": missing.statement,
         "equation": missing.equation,
         "parameters": missing.parameters.iter().map(encode_estimate).collect::<Vec<_>>(),
-        "delta_ic": encode_number(missing.delta_ic),
-        "p_value": encode_number(missing.p_value),
+        "delta_ic": encode_optional(missing.delta_ic),
+        "probability": encode_optional(missing.probability),
         "held_out_rmse_before": encode_optional(missing.held_out_rmse_before),
         "held_out_rmse_after": encode_optional(missing.held_out_rmse_after),
         "absorbed_share": encode_number(missing.absorbed_share),
+        "predictable": missing.not_predictable.is_none(),
+        "reason": missing.not_predictable.as_ref().map(|reason| reason.en.clone()),
     })
 }
 
 fn encode_estimate(e: &ParameterEstimate) -> Value {
-    json!({ "name": e.name, "value": encode_number(e.value), "low": encode_number(e.low), "high": encode_number(e.high), "unit": e.unit })
+    json!({ "name": e.name, "value": encode_number(e.value), "low": encode_optional(e.low), "high": encode_optional(e.high), "unit": e.unit })
 }
 
 fn encode_alternative(other: &Alternative) -> Value {
@@ -129,7 +132,6 @@ fn encode_experiment(experiment: &Experiment) -> Value {
     json!({
         "statement": experiment.statement,
         "minutes": encode_number(experiment.minutes),
-        "expected_delta_ic": encode_number(experiment.expected_delta_ic),
         "effect": experiment.effect,
     })
 }

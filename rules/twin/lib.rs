@@ -16,6 +16,7 @@
 pub mod bind;
 mod candidates;
 mod channel;
+mod departure;
 pub mod diagnosis;
 mod evidence;
 pub mod examine;
@@ -35,11 +36,13 @@ pub mod plan;
 mod prepared_recording;
 pub mod quality;
 pub mod region;
+pub mod simulate;
 pub mod speed_table;
 pub mod summary;
 pub mod term;
 pub mod text_report;
 
+pub use departure::Departure;
 pub use diagnosis::Diagnosis;
 pub use evidence::diagnose_recording;
 pub use examine::{Examination, examine_recording};

@@ -1,6 +1,7 @@
 //! A model: a list of effects with parameters, whose sum is the simulated output (`model/1`).
 
 use super::channel::{SIMULATED_OUTPUT, is_simulated};
+use super::departure::{DEPARTURE_USUAL, Departure, is_of_departure};
 use super::expression::Expression;
 use super::term::Term;
 use physics::{Effect, Entry, Form, ParameterDoc, Role, Scene};
@@ -23,6 +24,14 @@ pub struct Parameter {
     pub range: (f64, f64),
     /// Unit; `output` stands for the output's unit.
     pub unit: String,
+}
+
+impl Parameter {
+    /// By how much it usually deviates from zero; `None` of a parameter that may have any size.
+    #[must_use]
+    pub(super) fn prior_deviation(&self) -> Option<f64> {
+        is_of_departure(self).then_some(DEPARTURE_USUAL)
+    }
 }
 
 /// What a part computes.
@@ -60,6 +69,8 @@ pub struct Part {
     pub body: PartFunction,
     /// The numbers of the law, with values and ranges.
     pub parameters: Vec<Parameter>,
+    /// How the machine departs from the law.
+    pub departures: Vec<Departure>,
     /// Line of the file, 0 when it was not read from one.
     pub line: usize,
 }
@@ -77,7 +88,7 @@ impl Part {
             }
         }
         let body = PartFunction::Effect(effect, form.clone());
-        Self { kind: effect.doc().kind.to_owned(), name: None, body, parameters, line: 0 }
+        Self { kind: effect.doc().kind.to_owned(), name: None, body, parameters, departures: Vec::new(), line: 0 }
     }
 
     /// The name reports use: the user's, or the kind.
@@ -132,6 +143,14 @@ impl Part {
     /// One column per linear parameter, by name; `None` when an input is missing. An expression has none.
     #[must_use]
     pub fn compute_columns(&self, scene: &Scene) -> Option<Vec<(String, Vec<f64>)>> {
+        let mut columns = self.compute_law_columns(scene)?;
+        if let Some(factor) = self.compute_departure_factor(scene)? {
+            columns.iter_mut().for_each(|(_, c)| c.iter_mut().zip(&factor).for_each(|(x, factor)| *x *= factor));
+        }
+        Some(columns)
+    }
+
+    fn compute_law_columns(&self, scene: &Scene) -> Option<Vec<(String, Vec<f64>)>> {
         match &self.body {
             PartFunction::Effect(effect, form) => {
                 let columns = effect.compute_columns(scene, &self.build_current_form(form))?;
@@ -169,6 +188,12 @@ impl Part {
         over_output || self.has_form("clipped") || acting.contains(&self.kind.as_str())
     }
 
+    /// Is it a state that nobody records, followed from what all other parts leave of the earlier rows of a run?
+    #[must_use]
+    pub fn is_followed(&self) -> bool {
+        matches!(&self.body, PartFunction::Effect(effect, form) if effect.is_followed(form))
+    }
+
     /// Is it a formula over such a channel?
     fn reads_channel(&self, such: impl Fn(&str) -> bool) -> bool {
         matches!(&self.body, PartFunction::Expression(_)) && self.inputs().into_iter().any(such)
@@ -191,7 +216,7 @@ impl Part {
 
     /// Does this part have to be simulated again after that one of the same model has changed?
     fn depends_on_part(&self, changed: &Self) -> bool {
-        self.acts_on_output() && !changed.acts_on_output() || changed.is_read_by(self)
+        self.acts_on_output() && !changed.acts_on_output() || self.is_followed() || changed.is_read_by(self)
     }
 
     /// Does the other read what this one simulates, the output as a whole apart?
@@ -302,12 +327,15 @@ fn simulate_stages<'a>(
         run_stage(parts, scene, before, &mut contributions, &mut total, Part::is_load_loss)?;
         scene.set_load_at_output(Some(total.clone()));
     }
-    let in_between = |part: &Part| !(part.is_cut() || losses && part.is_load_loss() || part.acts_on_output());
+    let late = |part: &Part| part.acts_on_output() || part.is_followed();
+    let in_between = |part: &Part| !(part.is_cut() || losses && part.is_load_loss() || late(part));
     run_stage(parts, scene, before, &mut contributions, &mut total, in_between)?;
     scene.set_simulated(Some(total.clone()));
-    if parts.iter().any(Part::acts_on_output) {
-        run_stage(parts, scene, before, &mut contributions, &mut total, Part::acts_on_output)?;
-        scene.set_simulated(Some(total.clone()));
+    for last in [Part::acts_on_output, Part::is_followed] {
+        if parts.iter().any(last) {
+            run_stage(parts, scene, before, &mut contributions, &mut total, last)?;
+            scene.set_simulated(Some(total.clone()));
+        }
     }
     Some((total, contributions))
 }

@@ -1,5 +1,6 @@
 //! Model files (`model/1`): read with every problem at once, each with its line; written back in the same form.
 
+use super::departure::{Departure, is_of_departure};
 use super::expression::Expression;
 use super::model::{Model, Parameter, Part, PartFunction};
 use super::speed_table::SpeedTable;
@@ -131,7 +132,7 @@ impl<'t> Reader<'t> {
 
     fn read_part(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
         let known =
-            ["kind", "name", "parameters", "fixed", "columns", "expression", "process", "form", "place", "gear_stage"];
+            ["kind", "name", "parameters", "fixed", "columns", "expression", "process", "form", "place", "gear_stage", "departure"];
         self.report_unknown_keys(table, &known, "an [[effect]]");
         let Some(kind) = table.get("kind").and_then(|kind| kind.get_ref().as_str()) else {
             self.report_problem(offset, "an [[effect]] needs a kind".to_owned());
@@ -147,6 +148,7 @@ impl<'t> Reader<'t> {
         };
         part.name = name;
         part.line = self.find_line_number(kind_offset);
+        self.read_departures(&mut part, table);
         self.fix_parameters(&mut part, table);
         Some(part)
     }
@@ -298,6 +300,35 @@ impl<'t> Reader<'t> {
         form
     }
 
+    /// `departure = [{ over = "spindle_speed_rpm", x = [..], y = [..] }]`: the law times one plus the sum of them.
+    fn read_departures(&mut self, part: &mut Part, table: &Table<'_>) {
+        let Some(given) = table.get("departure") else { return };
+        let offset = given.span().start;
+        let entries = given.get_ref().as_array().map(|all| all.iter().filter_map(|one| one.get_ref().as_table()));
+        for (number, one) in entries.into_iter().flatten().enumerate() {
+            self.report_unknown_keys(one, &["over", "x", "y"], "a departure");
+            let list = |key: &str| -> Option<Vec<f64>> {
+                one.get(key)?.get_ref().as_array()?.iter().map(|value| parse_number(value.get_ref())).collect()
+            };
+            let over = one.get("over").and_then(|over| over.get_ref().as_str()).map(str::to_owned);
+            let (x, y) = (list("x").unwrap_or_default(), list("y").unwrap_or_default());
+            let rises = x.windows(2).all(|pair| pair[0] < pair[1]);
+            let (true, Some(over)) = (!x.is_empty() && x.len() == y.len() && rises, over) else {
+                let text = "a departure needs over = \"column\", increasing x, and as many y".to_owned();
+                self.report_problem(offset, text);
+                continue;
+            };
+            let departure = Departure { over, x };
+            let middle = y.iter().position(|y| *y == 0.0);
+            part.parameters.extend(departure.build_parameters(number, &y, middle));
+            part.departures.push(departure);
+        }
+        if part.departures.is_empty() {
+            let text = "write departures as departure = [{ over = \"column\", x = [..], y = [..] }]".to_owned();
+            self.report_problem(offset, text);
+        }
+    }
+
     fn fix_parameters(&mut self, part: &mut Part, table: &Table<'_>) {
         let Some(fixed) = table.get("fixed") else { return };
         let Some(names) = fixed.get_ref().as_array() else {
@@ -372,7 +403,7 @@ fn has_speed_table(table: &Table<'_>) -> bool {
 }
 
 fn build_part(kind: &str, body: PartFunction, parameters: Vec<Parameter>) -> Part {
-    Part { kind: kind.to_owned(), name: None, body, parameters, line: 0 }
+    Part { kind: kind.to_owned(), name: None, body, parameters, departures: Vec::new(), line: 0 }
 }
 
 fn build_free_parameter(name: &str, value: f64, entry: Entry) -> Parameter {
@@ -425,6 +456,7 @@ fn write_part(part: &Part) -> String {
     let numbers: Vec<String> = part
         .parameters
         .iter()
+        .filter(|parameter| !is_of_departure(parameter))
         .map(|parameter| format!("{} = {}", format_key(&parameter.name), format_float(parameter.value)))
         .collect();
     let numbers = numbers.join(", ");
@@ -452,16 +484,31 @@ fn write_part(part: &Part) -> String {
             }
         }
     }
+    text.push_str(&write_departures(part));
     let fixed: Vec<String> = part
         .parameters
         .iter()
-        .filter(|parameter| parameter.fixed)
+        .filter(|parameter| parameter.fixed && !is_of_departure(parameter))
         .map(|parameter| format_toml_text(&parameter.name))
         .collect();
     if !fixed.is_empty() {
         text.push_str(&format!("fixed = [{}]\n", fixed.join(", ")));
     }
     text
+}
+
+fn write_departures(part: &Part) -> String {
+    if part.departures.is_empty() {
+        return String::new();
+    }
+    let list = |values: &[f64]| values.iter().map(|x| format_float(*x)).collect::<Vec<_>>().join(", ");
+    let of = |(number, departure): (usize, &Departure)| {
+        let (over, x, y) =
+            (format_toml_text(&departure.over), list(&departure.x), list(&part.list_knot_values(number)));
+        format!("{{ over = {over}, x = [{x}], y = [{y}] }}")
+    };
+    let all: Vec<String> = part.departures.iter().enumerate().map(of).collect();
+    format!("departure = [{}]\n", all.join(", "))
 }
 
 fn write_table(part: &Part, table: &SpeedTable) -> String {
@@ -509,7 +556,7 @@ mod tests {
 
     #[test]
     fn a_model_survives_being_written_and_read() {
-        let text = "schema = \"model/1\"\nname = \"a \\\"b\\\"\"\noutput = \"y_w\"\n[[effect]]\nkind = \"linear\"\ncolumns = { one = 1.0, \"a^2\" = -2.5e-5 }\nfixed = [\"one\"]\n[[effect]]\nkind = \"flank_wear\"\nparameters = { k = 2.0, p = 1.0 }\n[[effect]]\nkind = \"no_load_power\"\nparameters = { speeds_rpm = [100.0, 200.0], power_w = [10.0, 20.0] }\n[[effect]]\nkind = \"expression\"\nname = \"door\"\nexpression = \"k * a\"\nparameters = { k = 1.0 }\n[roles]\nspeed = \"n_rpm\"\n";
+        let text = "schema = \"model/1\"\nname = \"a \\\"b\\\"\"\noutput = \"y_w\"\n[[effect]]\nkind = \"linear\"\ncolumns = { one = 1.0, \"a^2\" = -2.5e-5 }\nfixed = [\"one\"]\n[[effect]]\nkind = \"flank_wear\"\nparameters = { k = 2.0, p = 1.0 }\ndeparture = [{ over = \"n_rpm\", x = [100.0, 200.0, 300.0], y = [-0.1, 0.0, 0.2] }]\n[[effect]]\nkind = \"no_load_power\"\nparameters = { speeds_rpm = [100.0, 200.0], power_w = [10.0, 20.0] }\n[[effect]]\nkind = \"expression\"\nname = \"door\"\nexpression = \"k * a\"\nparameters = { k = 1.0 }\n[roles]\nspeed = \"n_rpm\"\n";
         let once = write_model(&parse_model(text).expect("reads"));
         let twice = write_model(&parse_model(&once).expect("reads again"));
         assert_eq!(once, twice);

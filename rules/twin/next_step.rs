@@ -6,14 +6,11 @@ use physics::find_effect;
 
 /// Minutes of an experiment over one channel: four levels of it, up and down, twice, half a minute each, and the way there.
 const CHANNEL_MINUTES: f64 = 10.0;
-/// Bounds within which the gain of an experiment is told: below the first it is worth nothing to anybody, and beyond the
-/// second nothing is left to be decided.
-const GAIN_BOUNDS: (f64, f64) = (10.0, 100.0);
 
 /// The experiment of the first of these kinds that the catalogue holds.
-pub(super) fn find_effect_experiment<'a>(mut kinds: impl Iterator<Item = &'a str>, gain: f64) -> Option<Experiment> {
+pub(super) fn find_effect_experiment<'a>(mut kinds: impl Iterator<Item = &'a str>) -> Option<Experiment> {
     let doc = kinds.find_map(find_effect)?.doc();
-    Some(build_experiment(doc.en.experiment.to_owned(), doc.experiment_minutes, gain, doc.kind))
+    Some(build_experiment(doc.en.experiment.to_owned(), doc.experiment_minutes, doc.kind))
 }
 
 /// Another kind that this data cannot rule out, `delta_ic` units of information behind the one it would replace, with the
@@ -28,15 +25,13 @@ pub(super) fn build_alternative(kind: &str, instead_of: &str, delta_ic: f64) -> 
     }
 }
 
-/// An experiment, its gain in information within the bounds in which it is told.
-pub(super) fn build_experiment(statement: String, minutes: f64, gain: f64, effect: &str) -> Experiment {
-    let expected_delta_ic = gain.clamp(GAIN_BOUNDS.0, GAIN_BOUNDS.1);
-    Experiment { statement, minutes, expected_delta_ic, effect: effect.to_owned() }
+fn build_experiment(statement: String, minutes: f64, effect: &str) -> Experiment {
+    Experiment { statement, minutes, effect: effect.to_owned() }
 }
 
 /// To learn what depends on this channel; on nothing that is known where there is none.
-pub(super) fn build_channel_experiment(channel: Option<&str>, gain: f64) -> Experiment {
-    build_experiment(channel.map_or_else(describe_repetition, describe_channel_sweep), CHANNEL_MINUTES, gain, "")
+pub(super) fn build_channel_experiment(channel: Option<&str>) -> Experiment {
+    build_experiment(channel.map_or_else(describe_repetition, describe_channel_sweep), CHANNEL_MINUTES, "")
 }
 
 fn describe_repetition() -> String {

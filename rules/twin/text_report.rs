@@ -138,17 +138,22 @@ impl Say<'_> {
         };
         let mut lines = vec![format!("{}: {statement}", self.describe_effect(&missing.effect))];
         lines.push(format!("  {}", missing.equation));
+        if let Some(reason) = &missing.not_predictable {
+            lines.push(format!("  {}", self.language.select_text(&reason.en, &reason.zh)));
+        }
         lines.extend(missing.parameters.iter().map(|parameter| format!("  {}", self.describe_estimate(parameter))));
         lines
     }
 
     fn describe_estimate(&self, estimate: &ParameterEstimate) -> String {
         let (name, unit) = (&estimate.name, if estimate.unit == "1" { "" } else { &estimate.unit });
-        let (value, low, high) = (
-            format_short_number(estimate.value),
-            format_short_number(estimate.low),
-            format_short_number(estimate.high),
-        );
+        let value = format_short_number(estimate.value);
+        let (Some(low), Some(high)) = (estimate.low.map(format_short_number), estimate.high.map(format_short_number)) else {
+            return self.language.select_text(
+                format!("{name} = {value} {unit} (interval not computed)"),
+                format!("{name} = {value} {unit}（未计算区间）"),
+            );
+        };
         self.language.select_text(
             format!("{name} = {value} {unit} (95 % between {low} and {high})"),
             format!("{name} = {value} {unit}（95 %区间{low}至{high}）"),
@@ -173,6 +178,13 @@ impl Say<'_> {
             self.language
                 .select_text(format!("error on the fitted runs: {pair}"), format!("参与拟合批次的误差：{pair}")),
         );
+        if let Some(ceiling) = &fit.ceiling {
+            let error = format_short_number(ceiling.held_out_rmse.unwrap_or(ceiling.rmse));
+            lines.push(self.language.select_text(
+                format!("the least error of any curve in its place: {error} {unit}"),
+                format!("任何曲线在此处可达到的最小误差：{error} {unit}"),
+            ));
+        }
         let (floor, rows, runs) = (format_short_number(fit.noise_floor), fit.rows, fit.runs);
         lines.push(self.language.select_text(
             format!("ordinary noise: {floor} {unit}; {rows} rows in {runs} runs were compared"),
@@ -192,18 +204,20 @@ impl Say<'_> {
 
     fn describe_evidence(&self, missing: &Missing) -> String {
         let name = self.describe_effect(&missing.effect);
-        let (information, p, absorbed) = (
-            format_short_number(missing.delta_ic),
-            format_short_number(missing.p_value),
-            100.0 * missing.absorbed_share,
-        );
-        self.language.select_text(
-            format!(
-                "{name}: information {information}; noise alone does as well in at most {p} of cases; the refitted model \
-                 had hidden {absorbed:.0} % of it"
-            ),
-            format!("{name}：信息量{information}；噪声达到同等程度的概率不超过{p}；重新拟合的模型掩盖了其{absorbed:.0} %"),
-        )
+        let mut en = vec![];
+        let mut zh = vec![];
+        if let Some(probability) = missing.probability {
+            en.push(format!("probability {probability:.2}"));
+            zh.push(format!("概率{probability:.2}"));
+        }
+        if let Some(information) = missing.delta_ic.map(format_short_number) {
+            en.push(format!("without it the model loses {information} of information"));
+            zh.push(format!("去掉它，模型损失信息量{information}"));
+        }
+        let absorbed = 100.0 * missing.absorbed_share;
+        en.push(format!("the refitted model had hidden {absorbed:.0} % of it"));
+        zh.push(format!("重新拟合的模型掩盖了其{absorbed:.0} %"));
+        self.language.select_text(format!("{name}: {}", en.join("; ")), format!("{name}：{}", zh.join("；")))
     }
 
     fn describe_alternative(&self, other: &Alternative) -> Vec<String> {
@@ -249,18 +263,16 @@ impl Say<'_> {
             (Language::Zh, Some(effect)) => effect.doc().zh.experiment,
             _ => experiment.statement.as_str(),
         };
-        let (minutes, gain) =
-            (format_short_number(experiment.minutes), format_short_number(experiment.expected_delta_ic));
-        let mut lines = vec![
+        let minutes = format_short_number(experiment.minutes);
+        vec![
             self.language.select_text(format!("{statement} ({minutes} min)"), format!("{statement}（{minutes} min）")),
-        ];
-        if experiment.expected_delta_ic > 0.0 {
-            lines.push(self.language.select_text(
-                format!("expected to separate the explanations by {gain} of information; `diagnose --experiment PLAN.csv` writes it as a plan"),
-                format!("预计区分信息量{gain}；`diagnose --experiment PLAN.csv`可将试验写成计划文件"),
-            ));
-        }
-        lines
+            self.language
+                .select_text(
+                    "`diagnose --experiment PLAN.csv` writes it as a plan",
+                    "`diagnose --experiment PLAN.csv`可将试验写成计划文件",
+                )
+                .to_owned(),
+        ]
     }
 
     fn list_faults(&self, diagnosis: &Diagnosis) -> Vec<String> {

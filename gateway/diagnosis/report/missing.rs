@@ -73,7 +73,7 @@ fn render_parameter(data: &Data<'_>, effect: &str, e: &ParameterEstimate) -> Str
     let meaning = data.tongue.describe_parameter(effect, &e.name);
     let unit = unit_text(&e.unit);
     let unit = if unit.is_empty() { "\u{2013}".to_owned() } else { unit };
-    let interval = match e.low.is_finite() && e.high.is_finite() {
+    let interval = match e.low.is_some() && e.high.is_some() {
         true => format!("{low} … {high}"),
         false => data.pick_text("not determined by this recording", "此记录无法确定").to_owned(),
     };
@@ -89,8 +89,9 @@ fn render_parameter(data: &Data<'_>, effect: &str, e: &ParameterEstimate) -> Str
 
 /// Value and interval with the same decimals: two significant digits of the interval's width.
 fn format_estimate(e: &ParameterEstimate) -> [String; 3] {
-    let numbers = [e.value, e.low, e.high];
-    let width = 0.5 * (e.high - e.low);
+    let (low, high) = (e.low.unwrap_or(f64::NEG_INFINITY), e.high.unwrap_or(f64::INFINITY));
+    let numbers = [e.value, low, high];
+    let width = 0.5 * (high - low);
     let greatest = numbers.iter().fold(0.0_f64, |top, x| top.max(x.abs()));
     if !width.is_finite() || width <= 0.0 || !(-3..6).contains(&decimal_exponent(greatest)) {
         return numbers.map(format_number);
@@ -104,35 +105,27 @@ fn render_fact(name: &str, value: &str) -> String {
 }
 
 fn render_certainty(data: &Data<'_>, missing: &Missing) -> String {
-    let searches = format_fixed((1.0 / missing.p_value.max(1e-6)).max(1.0).floor(), 0);
-    let strength = match missing.delta_ic {
-        gain if gain >= 20.0 => data.pick_text("Beyond reasonable doubt", "毋庸置疑"),
-        gain if gain >= 6.0 => data.pick_text("Well supported", "证据充分"),
-        _ => data.pick_text("Weakly supported", "证据较弱"),
-    };
-    let text = match data.tongue.0 {
-        Language::En => format!(
-            "{strength}: without it the fit loses {} units of information (6 are decisive), and noise alone would do as well in at most 1 of {searches} searches (p\u{a0}≤\u{a0}{}).",
-            format_number(missing.delta_ic),
-            chance_text(missing.p_value)
-        ),
-        Language::Zh => format!(
-            "{strength}：去掉它，拟合损失{}个信息单位（6个即具决定性）；仅凭噪声达到同样效果的可能至多为{searches}次搜索中的1次（p\u{a0}≤\u{a0}{}）。",
-            format_number(missing.delta_ic),
-            chance_text(missing.p_value)
-        ),
-    };
-    render_fact(data.pick_text("How sure", "有多确定"), &text)
-}
-
-/// A probability with two significant digits at most.
-fn chance_text(p: f64) -> String {
-    let text = super::text::format_significant(p, 2);
-    if text.contains('.') && !text.contains('<') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
+    let mut words: Vec<String> = Vec::new();
+    if let Some(probability) = missing.probability {
+        let shown = format_fixed(probability, 2);
+        words.push(match data.tongue.0 {
+            Language::En => format!("The probability of this name is {shown}, averaged over resamples of the recording."),
+            Language::Zh => format!("该名称的概率为{shown}（对记录多次重采样取平均）。"),
+        });
     }
+    if let Some(information) = missing.delta_ic.map(format_number) {
+        words.push(match data.tongue.0 {
+            Language::En => format!("Without it the model loses {information} units of information."),
+            Language::Zh => format!("去掉它，模型损失{information}个信息单位。"),
+        });
+    }
+    if let Some(reason) = &missing.not_predictable {
+        words.push(data.pick_text(&reason.en, &reason.zh).to_owned());
+    }
+    if words.is_empty() {
+        return String::new();
+    }
+    render_fact(data.pick_text("How sure", "有多确定"), &words.join(data.pick_text(" ", "")))
 }
 
 fn render_gain(data: &Data<'_>, missing: &Missing) -> String {

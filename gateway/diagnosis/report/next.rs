@@ -45,15 +45,8 @@ fn render_alternative(data: &Data<'_>, other: &Alternative) -> String {
 pub(super) fn render_experiment(data: &Data<'_>) -> String {
     let Some(next) = &data.diagnosis.next_experiment else { return String::new() };
     let minutes = with_unit(&format_fixed(next.minutes, i32::from(next.minutes.fract() != 0.0)), "min");
-    let gain = match (next.expected_delta_ic > 0.0, data.tongue.0) {
-        (true, Language::En) => {
-            format!("expected to bring {} units of information; 6 decide", format_number(next.expected_delta_ic))
-        }
-        (true, Language::Zh) => format!("预计带来{}个信息单位；6个即可判定", format_number(next.expected_delta_ic)),
-        (false, _) => data.pick_text("what it will bring cannot be foreseen", "收益无法预估").to_owned(),
-    };
     format!(
-        "<section class=\"next\"><h2>{}</h2><p class=\"lead\">{}{}</p><p class=\"note\">{} {minutes} · {gain}</p></section>\n",
+        "<section class=\"next\"><h2>{}</h2><p class=\"lead\">{}{}</p><p class=\"note\">{} {minutes}</p></section>\n",
         data.pick_text("What to record next", "下一步记录什么"),
         super::place::capitalise_first(data.tongue.translate_catalogue(&next.statement).trim_end_matches(['.', '。'])),
         data.pick_text(".", "。"),

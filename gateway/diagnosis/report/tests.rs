@@ -132,7 +132,7 @@ fn absent_figures_have_a_reason_and_an_onset_is_marked() {
     fit.held_out_runs.clear();
     for missing in &mut diagnosis.missing {
         (missing.held_out_rmse_before, missing.held_out_rmse_after) = (None, None);
-        missing.parameters.iter_mut().for_each(|e| (e.low, e.high) = (f64::NEG_INFINITY, f64::INFINITY));
+        missing.parameters.iter_mut().for_each(|e| (e.low, e.high) = (None, None));
     }
     let region = diagnosis.mismatch.first_mut().expect("a region");
     region.onset = Some(OnsetInterval { run: "r2".into(), time_s: 11.0, low_s: 10.5, high_s: 12.0 });

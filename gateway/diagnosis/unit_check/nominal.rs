@@ -95,7 +95,7 @@ fn describe_doubt(output: &str, given: f64, found: &[UnitHypothesis]) -> UnitDou
 
 /// Error of the model as given over the size of the output, its root mean square.
 fn relative_error(recording: &Recording, model: &Model) -> Option<f64> {
-    let simulation = simulation::run(recording, model).ok()?;
+    let simulation = simulation::run(recording, model, false).ok()?;
     let (rmse, _) = simulation.rmse()?;
     let numbers = recording.find_numbers(&model.output)?;
     let (sum, count) = numbers.present_values().fold((0.0, 0.0), |(sum, count), x| (sum + x * x, count + 1.0));

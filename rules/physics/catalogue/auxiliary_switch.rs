@@ -2,6 +2,7 @@
 
 use crate::drive::{is_axis_output, is_power};
 use crate::excitation::{compute_ln_count, has_variation};
+use crate::two_levels::{TwoLevels, predict_on_probability};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// A consumer that goes on and off.
@@ -11,14 +12,34 @@ pub struct AuxiliarySwitch;
 static DOC: EffectDoc = EffectDoc {
     kind: "auxiliary_switch",
     family: "auxiliary",
-    law: "P = level while the consumer runs",
-    parameters: &[ParameterDoc::new_linear(
-        "level",
-        "output",
-        (0.0, f64::INFINITY),
-        "power of the consumer",
-        "该用电设备的功率",
-    )],
+    law: "P = level while the consumer runs; latent: P = step * chance that it runs, from the earlier rows of the run",
+    parameters: &[
+        ParameterDoc::new_linear("level", "output", (0.0, f64::INFINITY), "power of the consumer", "该用电设备的功率"),
+        ParameterDoc::new_linear(
+            "share",
+            "1",
+            (0.0, 1.0),
+            "whole: the step is the power of the consumer",
+            "整体：阶跃即该用电设备的功率",
+        ),
+        ParameterDoc::new_shape(
+            "step",
+            "output",
+            (0.0, f64::INFINITY),
+            "power of a consumer that nobody records",
+            "未被记录的用电设备的功率",
+        ),
+        ParameterDoc::new_shape(
+            "deviation",
+            "output",
+            (0.0, f64::INFINITY),
+            "noise behind which it is looked for",
+            "识别该设备时的噪声",
+        ),
+        ParameterDoc::new_shape("memory", "1", (0.0, 0.99), "share of the noise that stays from row to row", "逐行保留的噪声比例"),
+        ParameterDoc::new_shape("dwell_s", "s", (0.001, 1e7), "mean time in one state", "每个状态的平均时间"),
+        ParameterDoc::new_shape("share_on", "1", (0.0, 1.0), "share of the time in which it runs", "运行时间的比例"),
+    ],
     needs: &["coolant_on | hydraulics_on | a column ending in _on | the recorded output"],
     source: "coolant 0.3-1.5 kW, high-pressure coolant 2-7 kW, hydraulics 0.5-2 kW in cycles of 5-60 s",
     experiment_minutes: 4.0,
@@ -45,7 +66,7 @@ impl Effect for AuxiliarySwitch {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &["flag", "latent"]
+        &["flag", LATENT]
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
@@ -60,8 +81,8 @@ impl Effect for AuxiliarySwitch {
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        if form.name == "latent" {
-            return Some(vec![("level", scene.unrecorded_state())]);
+        if form.name == LATENT {
+            return follow_latent_consumer(scene, form);
         }
         let (flag, _) = form.place.as_ref()?;
         Some(vec![("level", scene.column(flag)?.to_vec())])
@@ -70,4 +91,30 @@ impl Effect for AuxiliarySwitch {
     fn has_hidden_state(&self) -> bool {
         true
     }
+
+    fn is_followed(&self, form: &Form) -> bool {
+        form.name == LATENT
+    }
+}
+
+/// The form of a consumer that nobody records.
+pub const LATENT: &str = "latent";
+
+/// While it is fitted, its level for each row in which it was found on; in a simulation what is expected of it.
+fn follow_latent_consumer(scene: &Scene, form: &Form) -> Option<ParameterColumns> {
+    if let Some(on) = scene.unrecorded_state() {
+        return Some(vec![("level", on.to_vec())]);
+    }
+    let value = |name| form.shape_value(name);
+    let levels = TwoLevels {
+        step: value("step")?,
+        deviation: value("deviation")?,
+        memory: value("memory")?,
+        dwell_s: value("dwell_s")?,
+        share: value("share_on")?,
+    };
+    let simulated = scene.simulated_output()?;
+    let left: Vec<f64> = scene.recorded_output().iter().zip(simulated).map(|(y, f)| y - f).collect();
+    let on = predict_on_probability(scene, &left, levels);
+    Some(vec![("share", on.into_iter().map(|on| levels.step * on).collect())])
 }

@@ -66,18 +66,11 @@ impl Effect for RippleAlias {
         &DOC
     }
 
-    fn form_names(&self) -> &'static [&'static str] {
-        &["latent"]
-    }
-
     fn propose_forms(&self, _scene: &Scene) -> Vec<Form> {
         Vec::new()
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        if form.name == "latent" {
-            return Some(vec![("scale", scene.unrecorded_state())]);
-        }
         let turn = 2.0 * PI * form.shape_value("frequency_hz")?;
         let wave = |law: fn(f64) -> f64| scene.time_s().iter().map(|t| law(turn * t)).collect();
         Some(vec![("cosine", wave(f64::cos)), ("sine", wave(f64::sin))])

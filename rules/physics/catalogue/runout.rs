@@ -48,10 +48,6 @@ impl Effect for Runout {
         &DOC
     }
 
-    fn form_names(&self) -> &'static [&'static str] {
-        &["latent"]
-    }
-
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
         let (Some(speed), Some(cut)) = (scene.role_values(Role::Speed), estimate_cut_load(scene)) else { return Vec::new() };
         let in_cut = cut.iter().zip(speed).filter(|(cut, _)| **cut != 0.0).map(|(_, speed)| speed.abs());
@@ -60,10 +56,7 @@ impl Effect for Runout {
         told.then(Form::without_shape).into_iter().collect()
     }
 
-    fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        if form.name == "latent" {
-            return Some(vec![("scale", scene.unrecorded_state())]);
-        }
+    fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         let turn = compute_turn_rad(scene)?;
         let cosine = multiply_cut(scene, |row| turn[row].cos())?;
         let sine = multiply_cut(scene, |row| turn[row].sin())?;

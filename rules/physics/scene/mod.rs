@@ -154,6 +154,7 @@ pub struct Scene {
     load: Option<Vec<f64>>,
     load_at_output: Option<Vec<f64>>,
     simulated: Option<Vec<f64>>,
+    unrecorded_state: Option<Vec<f64>>,
     laws: RefCell<BTreeMap<String, LinearLaw>>,
     feed_load_growth: OnceLock<Option<Vec<f64>>>,
     usual_cut: OnceLock<f64>,
@@ -194,6 +195,7 @@ impl Scene {
             load: None,
             load_at_output: None,
             simulated: None,
+            unrecorded_state: None,
             laws: RefCell::default(),
             feed_load_growth: OnceLock::new(),
             usual_cut: OnceLock::new(),
@@ -407,10 +409,16 @@ impl Scene {
         self.load_at_output = load;
     }
 
-    /// A state that nobody records, in a model file: a recording does not hold it, so it is zero in every row.
+    /// A state that nobody records, as it was read from the whole recording while a law is fitted to it; `None` in a
+    /// simulation.
     #[must_use]
-    pub fn unrecorded_state(&self) -> Vec<f64> {
-        vec![0.0; self.rows()]
+    pub fn unrecorded_state(&self) -> Option<&[f64]> {
+        self.unrecorded_state.as_deref()
+    }
+
+    /// Sets such a state, one number per row.
+    pub fn set_unrecorded_state(&mut self, state: Option<Vec<f64>>) {
+        self.unrecorded_state = state;
     }
 
     /// The columns of a formula over this recording, found by `find` once and kept: columns never change.

@@ -3,6 +3,7 @@
 use super::posterior::Group;
 use super::thresholds::THRESHOLDS;
 use crate::diagnosis::{Existence, UNKNOWN, Verdict};
+use std::collections::BTreeMap;
 
 /// Another name, and what it would replace.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,6 +46,8 @@ pub(super) struct EvidenceAnswer {
     pub(super) remaining: Vec<(String, Vec<f64>)>,
     /// Twice the logarithm of the evidence over nothing.
     pub(super) information: f64,
+    /// Probability of each name, averaged over resamples.
+    pub(super) probabilities: BTreeMap<String, f64>,
     pub(super) existence: Existence,
     /// What is there and not told.
     pub(super) withdrawn: Option<Withdrawn>,
@@ -61,6 +64,11 @@ pub(super) struct EvidenceAnswer {
 pub(super) type Named = (String, Vec<f64>);
 
 impl EvidenceAnswer {
+    /// Probability of a name; `None` of one that no set held.
+    pub(super) fn find_probability(&self, name: &str) -> Option<f64> {
+        self.probabilities.get(name).copied()
+    }
+
     /// Something real that no name explains; names that come near stand beside it.
     pub(super) fn mark_unexplained(&mut self, groups: &[Group<'_>], ln: f64) {
         let mut near: Vec<(String, f64)> = self.names.iter().map(|name| (name.clone(), 0.0)).collect();

@@ -1,6 +1,7 @@
 //! What an explanation contributes: the output with it, and every name's share of it row by row.
 
 use super::answer::Named;
+use super::inputs::RecordingInputs;
 use super::linear_algebra::{CholeskyFactor, compute_gram_matrix};
 use super::noise::NoiseModel;
 use super::posterior::Explanation;
@@ -202,16 +203,21 @@ impl Judge<'_> {
 
     /// What the baseline cannot imitate of a contribution.
     pub(super) fn project_out_baseline(&self, x: &[f64]) -> Vec<f64> {
-        let rows: Vec<usize> = self.inputs.fitted_rows(false).collect();
-        let sizes: Vec<f64> = self.tangents.iter().map(|t| rms(t) + 1e-30).collect();
-        let scaled = self.tangents.iter().zip(&sizes);
-        let columns: Vec<Vec<f64>> = scaled.map(|(t, size)| rows.iter().map(|row| t[*row] / size).collect()).collect();
-        let wanted: Vec<f64> = rows.iter().map(|row| x[*row]).collect();
-        let w = numerics::linear::columns::least_squares(&columns, &wanted).coefficients;
-        let mut left = x.to_vec();
-        for ((tangent, size), w) in self.tangents.iter().zip(&sizes).zip(&w) {
-            left.iter_mut().zip(tangent).for_each(|(left, t)| *left -= w * t / size);
-        }
-        left
+        project_out_baseline(self.inputs, self.tangents, x)
     }
+}
+
+/// What a baseline of these tangents cannot imitate of a contribution.
+pub(super) fn project_out_baseline(inputs: &RecordingInputs<'_>, tangents: &[Vec<f64>], x: &[f64]) -> Vec<f64> {
+    let rows: Vec<usize> = inputs.fitted_rows(false).collect();
+    let sizes: Vec<f64> = tangents.iter().map(|t| rms(t) + 1e-30).collect();
+    let scaled = tangents.iter().zip(&sizes);
+    let columns: Vec<Vec<f64>> = scaled.map(|(t, size)| rows.iter().map(|row| t[*row] / size).collect()).collect();
+    let wanted: Vec<f64> = rows.iter().map(|row| x[*row]).collect();
+    let w = numerics::linear::columns::least_squares(&columns, &wanted).coefficients;
+    let mut left = x.to_vec();
+    for ((tangent, size), w) in tangents.iter().zip(&sizes).zip(&w) {
+        left.iter_mut().zip(tangent).for_each(|(left, t)| *left -= w * t / size);
+    }
+    left
 }

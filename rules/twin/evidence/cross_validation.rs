@@ -134,7 +134,7 @@ pub(super) fn sum_paired_gains(period_s: f64, rows: impl IntoIterator<Item = (us
 }
 
 /// Places of the rows of each part: the fitted units in turn.
-fn split_into_parts(inputs: &RecordingInputs<'_>, comparison: &Comparison<'_>) -> Vec<Vec<usize>> {
+pub(super) fn split_into_parts(inputs: &RecordingInputs<'_>, comparison: &Comparison<'_>) -> Vec<Vec<usize>> {
     let mut number: BTreeMap<usize, usize> = BTreeMap::new();
     let mut parts: Vec<Vec<usize>> = Vec::new();
     for (at, row) in comparison.rows.iter().enumerate() {

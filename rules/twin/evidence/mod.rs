@@ -20,6 +20,9 @@ mod families;
 mod gram;
 mod hidden_sequence;
 mod inputs;
+mod latent_law;
+mod law_starts;
+mod leave_out;
 mod linear_algebra;
 mod marginal;
 mod naming;
@@ -42,6 +45,8 @@ mod unrecorded_states;
 mod validation;
 mod variant_bank;
 mod variant_evidence;
+mod written_law;
+mod written_model;
 
 use super::diagnosis::{Diagnosis, Experiment, Rows, Verdict, find_output_unit};
 use super::fit::{Fit, Metric, fit_parts};
@@ -129,7 +134,6 @@ fn build_undecided_diagnosis(case: &Case<'_>, needed: &Bilingual) -> Diagnosis {
         next_experiment: Some(Experiment {
             statement: format!("Record {needed}."),
             minutes: 10.0,
-            expected_delta_ic: 0.0,
             effect: String::new(),
         }),
         rows: Rows::default(),

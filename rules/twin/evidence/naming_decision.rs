@@ -48,6 +48,7 @@ impl Judge<'_> {
             contributions,
             remaining,
             information,
+            probabilities: sum_name_probabilities(groups),
             withdrawn: None,
             claimed: self.list_claimed_kinds(best),
             drawn_over: self.find_curve_channel(best),
@@ -75,10 +76,8 @@ impl Judge<'_> {
 
     /// Explained or ambiguous, and what stands beside the names.
     fn judge_names(&self, answer: &mut EvidenceAnswer, (best, ln): (&Explanation, f64), groups: &[Group<'_>]) {
-        let mass = |name: &str| {
-            let of = |g: &&Group<'_>| g.names.iter().any(|n| n.as_deref() == Some(name));
-            groups.iter().filter(of).map(|g| g.ln.exp()).sum::<f64>()
-        };
+        let probabilities = sum_name_probabilities(groups);
+        let mass = |name: &str| probabilities.get(name).copied().unwrap_or(0.0);
         let alone = |name: &String| mass(name) >= THRESHOLDS.alone;
         let mut beside: Vec<(String, f64)> = Vec::new();
         for other in groups.iter().filter(|other| other.ln > ln - THRESHOLDS.beside) {
@@ -167,6 +166,18 @@ impl Judge<'_> {
         class.sort_by(|a, b| a.nats.total_cmp(&b.nats).then_with(|| a.name.cmp(&b.name)));
         class
     }
+}
+
+/// Probability of each name: that of all sets which hold it.
+fn sum_name_probabilities(groups: &[Group<'_>]) -> BTreeMap<String, f64> {
+    let mut all: BTreeMap<String, f64> = BTreeMap::new();
+    for group in groups {
+        for name in group.names.iter().flatten() {
+            *all.entry(name.clone()).or_default() += group.ln.exp();
+        }
+    }
+    all.values_mut().for_each(|probability| *probability = probability.min(1.0));
+    all
 }
 
 /// Does another law make nearly as much of a contribution as the law that gave it its name?

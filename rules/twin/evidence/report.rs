@@ -8,11 +8,15 @@ use super::answer::{EvidenceAnswer, sum_contributions};
 use super::gram::Comparison;
 use super::inputs::RecordingInputs;
 use super::noise::NoiseModel;
+use super::contributions::project_out_baseline;
 use super::textbook::Textbook;
+use super::thresholds::THRESHOLDS;
+use super::written_model::WrittenModel;
 use crate::diagnosis::{
     Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, UNKNOWN, Verdict,
     find_output_unit,
 };
+use crate::departure::Departure;
 use crate::fit::Fit;
 use crate::inputs::mark_rows_with_inputs;
 use crate::intervals::FittedRows;
@@ -22,6 +26,7 @@ use crate::place_search::PlaceSearch;
 use crate::prepared_recording::Case;
 use crate::region::{Region, compute_usual_size, list_spans, mark_active_rows};
 use crate::summary;
+use crate::text_report::{format_short_number, format_signed_number};
 use adapter_core::bilingual::Bilingual;
 use numerics::statistics::{count_to_f64, rms};
 use physics::find_effect;
@@ -47,8 +52,8 @@ pub(super) struct EvidenceReport<'a, 'm> {
 
 impl EvidenceReport<'_, '_> {
     pub(super) fn into_diagnosis(mut self) -> Diagnosis {
-        let fits = self.compare_fits();
-        let mut textbook = self.fit_textbook_laws(&[]);
+        let curve = self.answer.after.clone();
+        let mut textbook = self.fit_textbook_laws();
         for attempt in 0..=REPLACED_MAX {
             let refused = self.list_refused_names(&textbook);
             if refused.is_empty() {
@@ -58,21 +63,15 @@ impl EvidenceReport<'_, '_> {
             if !unnamed.is_empty() {
                 self.answer.reject_names(&unnamed, |x| self.inputs.fitted_rows(false).map(|row| x[row] * x[row]).sum());
             }
-            textbook = self.fit_textbook_laws(&[]);
+            textbook = self.fit_textbook_laws();
         }
-        let doubted = self.list_doubted_names(&textbook);
-        if !doubted.is_empty() {
-            self.answer.add_unknown_rivals(&doubted);
-            textbook = self.fit_textbook_laws(&doubted);
-        }
-        let missing = self.list_missing_effects(&fits, &textbook);
+        let written = self.tell_written_model(&textbook);
+        let fits = self.compare_fits(&curve);
+        let missing = self.list_missing_effects(&fits, &textbook, written.as_ref());
         let alternatives: Vec<Alternative> = self.list_alternatives();
-        let fit = textbook.fit.as_ref();
-        let model = fit.map_or_else(
-            || self.case.model.clone(),
-            |fit| Model { parts: fit.parts.clone(), ..self.case.model.clone() },
-        );
-        let shift = if missing.is_empty() { Vec::new() } else { fit.map_or_else(Vec::new, |f| self.list_shifts(f)) };
+        let parts = written.map_or_else(|| self.baseline.parts.clone(), |written| written.parts);
+        let shift = if missing.is_empty() { Vec::new() } else { self.list_shifts(&parts) };
+        let model = Model { parts, ..self.case.model.clone() };
         let withdrawn = self.answer.withdrawn.take();
         let mut diagnosis = Diagnosis {
             output: self.case.model.output.clone(),
@@ -98,13 +97,54 @@ impl EvidenceReport<'_, '_> {
         diagnosis
     }
 
+    /// What is told is what the file does: the free curve is the ceiling only. A law that does not lower the error of rows held
+    /// out is taken back; one that keeps little of what the curve gains stands beside something without a name, and so does a
+    /// name that nothing can be written for.
+    fn tell_written_model(&mut self, textbook: &Textbook) -> Option<WrittenModel> {
+        if !matches!(self.answer.verdict, Verdict::Explained | Verdict::Ambiguous) {
+            return None;
+        }
+        let written = textbook.fit.as_ref().filter(|_| textbook.laws.iter().any(Option::is_some));
+        let written = written.and_then(|fit| self.write_fit(fit));
+        let error = |total: &[f64]| self.compute_told_rmse(total).unwrap_or(f64::INFINITY);
+        let (before, curve) = (error(&self.inputs.simulated), error(&self.answer.after));
+        let law = written.as_ref().map_or(f64::INFINITY, |written| error(&written.total));
+        self.answer.debug.push_str(&format!("\nwritten {law:.5} before {before:.5} curve {curve:.5}"));
+        let Some(written) = written.filter(|_| law < before) else {
+            self.answer.withdraw_names(Vec::new());
+            return None;
+        };
+        let kept = (before - law) / (before - curve).max(f64::MIN_POSITIVE);
+        let lawless = self.answer.names.iter().zip(&textbook.laws).filter(|(_, law)| law.is_none());
+        let lawless: Vec<String> = lawless.map(|(name, _)| name.clone()).collect();
+        if kept < THRESHOLDS.kept {
+            let names = self.answer.names.clone();
+            self.answer.add_unknown_rivals(&names);
+        } else if !lawless.is_empty() {
+            self.answer.add_unknown_rivals(&lawless);
+        }
+        self.answer.contributions = self.list_written_contributions(textbook, &written);
+        let project = |(name, x): &(String, Vec<f64>)| {
+            (name.clone(), project_out_baseline(self.inputs, &self.baseline.tangents, x))
+        };
+        self.answer.remaining = self.answer.contributions.iter().map(project).collect();
+        self.answer.after.clone_from(&written.total);
+        Some(written)
+    }
+
+    /// Root mean square error in the rows that are told: those held out, or the fitted ones where none were.
+    pub(super) fn compute_told_rmse(&self, total: &[f64]) -> Option<f64> {
+        let rows = if self.inputs.held_out.contains(&true) { &self.inputs.held_out } else { &self.inputs.fitted };
+        self.compute_rmse(total, rows)
+    }
+
     fn compute_rmse(&self, total: &[f64], rows: &[bool]) -> Option<f64> {
         let recorded = self.inputs.scene.recorded_output();
         let left: Vec<f64> = (0..rows.len()).filter(|row| rows[*row]).map(|row| recorded[row] - total[row]).collect();
         (!left.is_empty()).then(|| rms(&left))
     }
 
-    fn compare_fits(&self) -> Fits {
+    fn compare_fits(&self, curve: &[f64]) -> Fits {
         let quality = |total: &[f64]| Quality {
             rmse: self.compute_rmse(total, &self.inputs.fitted).unwrap_or(0.0),
             held_out_rmse: self.compute_rmse(total, &self.inputs.held_out),
@@ -116,30 +156,42 @@ impl EvidenceReport<'_, '_> {
             noise_floor: self.ordinary,
             before: quality(&self.inputs.simulated),
             after: quality(&self.answer.after),
+            ceiling: (!self.answer.names.is_empty()).then(|| quality(curve)),
         }
     }
 
-    fn list_missing_effects(&mut self, fits: &Fits, textbook: &Textbook) -> Vec<Missing> {
-        let names = self.answer.names.clone();
+    fn list_missing_effects(
+        &mut self,
+        fits: &Fits,
+        textbook: &Textbook,
+        written: Option<&WrittenModel>,
+    ) -> Vec<Missing> {
         let mut all = Vec::new();
-        for (at, name) in names.iter().enumerate() {
-            let place = textbook.laws.get(at).copied().flatten().map(|(place, _)| place);
-            let parameters: Vec<ParameterEstimate> = match (place, &textbook.fit) {
-                (Some(place), Some(fit)) => self.estimate_parameters(fit, place),
-                _ => self.estimate_curve_size(name),
+        for (at, name) in self.answer.names.clone().iter().enumerate() {
+            let place = textbook.laws.get(at).copied().flatten().map(|(place, _)| place).filter(|_| written.is_some());
+            let fit = textbook.fit.as_ref();
+            let own = fit.zip(place).and_then(|(fit, place)| self.measure_own_figures(fit, place));
+            let parameters = match fit.zip(place) {
+                Some((fit, place)) => self.estimate_parameters(fit, place),
+                None => self.compute_curve_size(name),
             };
-            let part = place.and_then(|place| textbook.fit.as_ref().map(|fit| &fit.parts[place]));
+            let part = written.zip(place).map(|(written, place)| &written.parts[place]);
             let (statement, equation) = describe_law(name, part);
+            let told = place.is_some() || name == UNKNOWN;
             all.push(Missing {
                 effect: name.clone(),
                 statement,
                 equation,
                 parameters,
-                delta_ic: self.answer.information,
-                p_value: (-0.5 * self.answer.information).exp().clamp(1e-12, 1.0),
-                held_out_rmse_before: fits.before.held_out_rmse,
-                held_out_rmse_after: fits.after.held_out_rmse,
+                delta_ic: own.map(|own| own.information).or_else(|| (!told).then_some(self.answer.information)),
+                probability: self.answer.find_probability(name),
+                held_out_rmse_before: own
+                    .and_then(|own| own.error_without)
+                    .or(fits.before.held_out_rmse)
+                    .filter(|_| told && fits.after.held_out_rmse.is_some()),
+                held_out_rmse_after: fits.after.held_out_rmse.filter(|_| told),
                 absorbed_share: self.compute_absorbed_share(name),
+                not_predictable: part.and_then(describe_hindrance),
             });
         }
         all
@@ -159,12 +211,11 @@ impl EvidenceReport<'_, '_> {
         rows.estimate_parameters(place)
     }
 
-    /// The size of a curve that has no law: its root mean square where it acts.
-    fn estimate_curve_size(&self, name: &str) -> Vec<ParameterEstimate> {
+    /// The size of a curve that has no law: its root mean square. No fit tells how well it is known.
+    fn compute_curve_size(&self, name: &str) -> Vec<ParameterEstimate> {
         let Some((_, x)) = self.answer.contributions.iter().find(|(known, _)| known == name) else { return Vec::new() };
-        let value = rms(x);
         let unit = find_output_unit(&self.case.model.output).to_owned();
-        vec![ParameterEstimate { name: "rms".to_owned(), value, low: 0.8 * value, high: 1.2 * value, unit }]
+        vec![ParameterEstimate { name: "rms".to_owned(), value: rms(x), low: None, high: None, unit }]
     }
 
     /// Share of a contribution's square that the baseline can imitate.
@@ -192,9 +243,7 @@ impl EvidenceReport<'_, '_> {
         }
         let open = alternatives.iter().flat_map(|other| [other.effect.as_str(), other.instead_of.as_str()]);
         let kinds = open.chain(self.answer.names.iter().map(String::as_str)).chain(gone.iter().map(String::as_str));
-        let gain = self.answer.information;
-        find_effect_experiment(kinds, gain)
-            .or_else(|| Some(build_channel_experiment(self.answer.drawn_over.as_deref(), gain)))
+        find_effect_experiment(kinds).or_else(|| Some(build_channel_experiment(self.answer.drawn_over.as_deref())))
     }
 
     /// One region for each name, the largest share first.
@@ -239,8 +288,8 @@ impl EvidenceReport<'_, '_> {
         }
     }
 
-    fn list_shifts(&self, fit: &Fit) -> Vec<Shift> {
-        let pairs = self.baseline.parts.iter().zip(&fit.parts);
+    fn list_shifts(&self, parts: &[Part]) -> Vec<Shift> {
+        let pairs = self.baseline.parts.iter().zip(parts);
         let of = |(before, after): (&Part, &Part)| {
             let parameters = before.parameters.iter().zip(&after.parameters).filter(|(before, _)| !before.fixed);
             let shift = |(b, a): (&Parameter, &Parameter)| Shift {
@@ -261,8 +310,35 @@ fn describe_law(name: &str, part: Option<&Part>) -> (String, String) {
     }
     let place = part.and_then(Part::effect_and_form).and_then(|(_, form)| form.place);
     let place = place.map(|(column, word)| format!(" ({column} {word})")).unwrap_or_default();
+    let departs = part.map(describe_departures).unwrap_or_default();
     find_effect(name).map_or_else(
-        || ("The user's hypothesis".to_owned(), name.to_owned()),
-        |effect| (format!("{}{place}", effect.doc().en.statement), effect.doc().law.to_owned()),
+        || ("The user's hypothesis".to_owned(), format!("{name}{departs}")),
+        |effect| (format!("{}{place}", effect.doc().en.statement), format!("{}{departs}", effect.doc().law)),
     )
+}
+
+/// How the machine departs from the law, as a line of text; empty where it does not.
+fn describe_departures(part: &Part) -> String {
+    let of = |(number, departure): (usize, &Departure)| {
+        let knots = departure.x.iter().zip(part.list_knot_values(number));
+        let knots = knots.map(|(x, y)| format!("{} at {}", format_signed_number(y), format_short_number(*x)));
+        format!("; times 1 + d over {}: {}", departure.over, knots.collect::<Vec<_>>().join(", "))
+    };
+    part.departures.iter().enumerate().map(of).collect()
+}
+
+/// Why a part cannot be simulated ahead.
+fn describe_hindrance(part: &Part) -> Option<Bilingual> {
+    if part.is_followed() {
+        return Some(Bilingual::new(
+            "Nobody records when it is on: it is followed from earlier rows of the same run and cannot be simulated ahead",
+            "没有记录其何时运行：只能由同一批次的先前各行跟踪，无法预先仿真",
+        ));
+    }
+    (part.kind == "zero_drift").then(|| {
+        Bilingual::new(
+            "It describes this recording: how the zero will drift in the next one is not known",
+            "仅描述此记录：下一次记录的零点如何漂移未知",
+        )
+    })
 }

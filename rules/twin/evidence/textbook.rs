@@ -1,8 +1,10 @@
 //! The textbook law that comes nearest to what was found, refitted together with the baseline: its parameters mean what the
 //! catalogue says, and the extended model can be simulated.
 
+use super::latent_law::{CONSUMER, build_latent_part, read_two_level_state};
 use super::report::EvidenceReport;
 use super::thresholds::THRESHOLDS;
+use crate::departure::is_of_departure;
 use crate::fit::{Fit, Metric, fit_parts};
 use crate::model::{Parameter, Part};
 use numerics::linear::columns::least_squares;
@@ -23,29 +25,43 @@ pub(super) struct Textbook {
 }
 
 impl EvidenceReport<'_, '_> {
-    /// The nearest law of the catalogue for each name but some, and all of them refitted with the baseline.
-    pub(super) fn fit_textbook_laws(&mut self, without: &[String]) -> Textbook {
-        let mut parts = self.baseline.parts.clone();
+    /// The law of the catalogue for each name, and all of them fitted with the baseline as they would be written.
+    pub(super) fn fit_textbook_laws(&mut self) -> Textbook {
+        let mut near: Vec<(String, Part)> = Vec::new();
         let mut laws = Vec::new();
-        for name in &self.answer.names {
-            let own = self.answer.contributions.iter().find(|(known, _)| known == name && !without.contains(known));
-            let law = own.and_then(|(_, x)| self.find_nearest_law(name, x));
-            laws.push(law.as_ref().map(|(_, share)| (parts.len(), *share)));
-            parts.extend(law.map(|(part, _)| part));
+        for name in self.answer.names.clone() {
+            let own = self.answer.contributions.iter().find(|(known, _)| *known == name).map(|(_, x)| x.clone());
+            let law = own.and_then(|x| self.find_nearest_law(&name, &x).or_else(|| self.find_latent_law(&name, &x)));
+            laws.push(law.as_ref().map(|(_, share)| (self.baseline.parts.len() + near.len(), *share)));
+            near.extend(law.map(|(part, _)| (name, part)));
         }
-        let fit = if self.answer.names.is_empty() { None } else { self.refit_parts(&parts) };
+        let fit = if self.answer.names.is_empty() { None } else { self.fit_named_laws(&near) };
         Textbook { laws, fit }
+    }
+
+    /// A consumer that nobody records, where a contribution is on or off; its state is kept while laws are fitted.
+    fn find_latent_law(&mut self, name: &str, contribution: &[f64]) -> Option<(Part, f64)> {
+        if name != CONSUMER {
+            return None;
+        }
+        let on = read_two_level_state(self.inputs, contribution)?;
+        let height: f64 = self.inputs.fitted_rows(false).map(|row| on[row] * contribution[row]).sum();
+        let rows: f64 = self.inputs.fitted_rows(false).map(|row| on[row]).sum();
+        let part = build_latent_part(height / rows)?;
+        self.case.scene.set_unrecorded_state(Some(on));
+        Some((part, 1.0))
     }
 
     /// The parts refitted in the metric of the likeliest noise; a shape that runs to the end of its range says nothing, and
     /// stays as it was.
-    fn refit_parts(&mut self, parts: &[Part]) -> Option<Fit> {
+    pub(super) fn refit_parts(&mut self, parts: &[Part]) -> Option<Fit> {
         let fitted = self.fit_in_noise_metric(parts)?;
         let mut held = parts.to_vec();
         let mut ran_away = false;
         for (part, fitted) in held.iter_mut().zip(&fitted.parts).skip(self.baseline.parts.len()) {
             for (parameter, fitted) in part.parameters.iter_mut().zip(&fitted.parameters) {
-                if !parameter.fixed && parameter.entry == Entry::Shape && is_at_limit(fitted.value, fitted.range) {
+                let is_of_law = parameter.entry == Entry::Shape && !is_of_departure(parameter);
+                if !parameter.fixed && is_of_law && is_at_limit(fitted.value, fitted.range) {
                     parameter.fixed = true;
                     ran_away = true;
                 }
@@ -78,16 +94,6 @@ impl EvidenceReport<'_, '_> {
         refused
     }
 
-    /// Names of curves of which the textbook law makes little: they stand beside "unknown", without its parameters.
-    pub(super) fn list_doubted_names(&mut self, textbook: &Textbook) -> Vec<String> {
-        let makes_little = |law: &Option<(usize, f64)>| law.is_some_and(|(_, share)| share < THRESHOLDS.textbook_share);
-        let names = self.answer.names.iter().zip(&textbook.laws);
-        let doubted = names.filter(|(name, law)| self.answer.claimed.contains(name) && makes_little(law));
-        let doubted: Vec<String> = doubted.map(|(name, _)| name.clone()).collect();
-        doubted.iter().for_each(|name| self.answer.debug.push_str(&format!("\n{name} doubted")));
-        doubted
-    }
-
     /// Is a contribution larger than its effect can be beside what the machine takes anyway?
     fn is_too_large(&self, name: &str, contribution: &[f64]) -> bool {
         let cut = self.inputs.cut.as_deref().filter(|_| self.inputs.knows_cut);
@@ -105,7 +111,7 @@ impl EvidenceReport<'_, '_> {
     }
 
     /// The form of a kind whose law, the baseline beside it, comes nearest to a contribution.
-    fn find_nearest_law(&self, kind: &str, contribution: &[f64]) -> Option<(Part, f64)> {
+    pub(super) fn find_nearest_law(&self, kind: &str, contribution: &[f64]) -> Option<(Part, f64)> {
         let hypothesis = self.case.model.hypotheses.iter().find(|part| part.label() == kind);
         if let Some(part) = hypothesis {
             return Some((part.clone(), 1.0));
@@ -158,7 +164,7 @@ fn is_impossible(part: &Part) -> bool {
 }
 
 /// A candidate with these values of its linear parameters, within what is possible.
-fn build_candidate(
+pub(super) fn build_candidate(
     effect: &'static dyn Effect,
     scene: &Scene,
     form: &Form,
@@ -168,6 +174,7 @@ fn build_candidate(
     for parameter in &mut part.parameters {
         if let Some(doc) = effect.doc().find_parameter(&parameter.name) {
             parameter.range = effect.parameter_range(scene, doc);
+            parameter.value = parameter.value.clamp(parameter.range.0, parameter.range.1);
         }
     }
     for (name, value) in names.iter().zip(values) {

@@ -72,8 +72,10 @@ pub(super) struct Thresholds {
     /// Size in deviations of the ordinary noise, and as a share of the output, below which (both) a name is dropped.
     pub(super) size_noise: f64,
     pub(super) size_output: f64,
-    /// Share of what a curve brings that the textbook law must bring that it got its name from.
+    /// Share of what a curve brings that the law of a state must bring, so that it is that state.
     pub(super) textbook_share: f64,
+    /// Share of what a curve gains in rows held out that the law must gain as it is written, so that its name stands alone.
+    pub(super) kept: f64,
     /// Nats behind the best within which a set is looked at.
     pub(super) looked_at: f64,
     /// Nats behind the best within which another name stands beside it.
@@ -104,6 +106,7 @@ pub(super) const THRESHOLDS: Thresholds = Thresholds {
     size_noise: 0.3,
     size_output: 0.005,
     textbook_share: 0.6,
+    kept: 0.8,
     looked_at: 6.0,
     beside: 3.5,
 };

@@ -98,9 +98,7 @@ impl Judge<'_> {
         groups: &[Group<'_>],
         lost: bool,
     ) -> EvidenceAnswer {
-        let nothing = silent.existence.probability_of_nothing.max(1e-300).ln();
-        let information = 2.0 * (best.ln - nothing);
-        let mut answer = self.decide_names(silent, best, groups, information);
+        let mut answer = self.decide_names(silent, best, groups, 2.0 * best.over_nothing);
         if lost && answer.verdict == Verdict::Explained {
             // What explained most did not carry over: what is left of it has no sure name.
             answer.debug.push_str("; withdrawn in part");
@@ -243,6 +241,7 @@ impl Judge<'_> {
             contributions: Vec::new(),
             remaining: Vec::new(),
             information: 0.0,
+            probabilities: BTreeMap::new(),
             existence: Existence {
                 probability_of_nothing: ln.exp(),
                 effective_rows: self.test.effective_rows,

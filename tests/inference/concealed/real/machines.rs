@@ -69,7 +69,7 @@ fn names(answer: &Answer) -> Vec<&str> {
 fn estimates(answer: &Answer, effect: &str) -> String {
     let found = answer.missing.iter().find(|m| m.effect == effect);
     let text = |e: &crate::concealed::score::answer::Estimate| {
-        format!("{} {:.3} ({:.3} to {:.3}) {}", e.name, e.value, e.low, e.high, e.unit)
+        format!("{} {:.3} ({:.3?} to {:.3?}) {}", e.name, e.value, e.low, e.high, e.unit)
     };
     found.map_or(String::new(), |m| m.parameters.iter().map(text).collect::<Vec<_>>().join(", "))
 }
