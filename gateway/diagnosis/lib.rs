@@ -12,7 +12,10 @@ mod join;
 pub mod map_file;
 pub mod model_new;
 mod models;
+mod order;
 mod outputs;
+#[cfg(test)]
+mod probe;
 mod recordings;
 pub mod report;
 pub mod series;
@@ -28,5 +31,6 @@ pub mod worker;
 
 pub use join::{JoinError, join_recordings};
 pub use models::{read_hypotheses, read_model};
+pub use order::Copies;
 pub use outputs::{DiagnosisOutputs, write_output};
 pub use recordings::{InputRecordings, describe_reading, read_recordings, read_recordings_as};
