@@ -14,8 +14,6 @@ pub mod model_new;
 mod models;
 mod order;
 mod outputs;
-#[cfg(test)]
-mod probe;
 mod recordings;
 pub mod report;
 pub mod series;
@@ -34,3 +32,5 @@ pub use models::{read_hypotheses, read_model};
 pub use order::Copies;
 pub use outputs::{DiagnosisOutputs, write_output};
 pub use recordings::{InputRecordings, describe_reading, read_recordings, read_recordings_as};
+#[cfg(test)]
+mod probe;

@@ -21,11 +21,11 @@ const NAMED_MAX: usize = 12;
 
 /// Recordings in order, each row once, and what was done to them.
 #[derive(Debug)]
-pub struct OrderedRecordings {
+pub(super) struct OrderedRecordings {
     /// In the order of time.
-    pub recordings: Vec<Recording>,
+    pub(super) recordings: Vec<Recording>,
     /// What a reader of the report has to know; the same for every order of the files.
-    pub remarks: Vec<Bilingual>,
+    pub(super) remarks: Vec<Bilingual>,
 }
 
 /// What is there twice.
@@ -39,7 +39,7 @@ pub enum Copies {
 
 /// Puts recordings in the order of time and leaves out what is there twice where it counts once.
 #[must_use]
-pub fn order_recordings(mut recordings: Vec<Recording>, copies: Copies) -> OrderedRecordings {
+pub(super) fn order_recordings(mut recordings: Vec<Recording>, copies: Copies) -> OrderedRecordings {
     let several = recordings.len() > 1;
     recordings.sort_by(|a, b| compare_names(&a.source, &b.source));
     let by_time = sort_by_time(&mut recordings);
