@@ -4,7 +4,10 @@ use super::lang::{language, localize_text, pick_text};
 use super::{CannotRun, CommandOutcome, CommandResult};
 use crate::diagnosis::context::DiagnosisContext;
 use crate::diagnosis::series::{AlignBy, SimulatedSeries, attach_series, recorded_output, series_model};
-use crate::diagnosis::{DiagnosisOutputs, InputRecordings, read_hypotheses, read_model, read_recordings_as, stretch};
+use crate::diagnosis::{
+    Copies, DiagnosisOutputs, InputRecordings, read_hypotheses, read_model, read_recordings_as, stretch,
+};
+use adapters::recording::Recording;
 use clap::Args;
 use rules::twin::{self, Diagnosis, Model};
 use std::path::PathBuf;
@@ -57,6 +60,7 @@ pub(super) struct DiagnoseArguments {
 /// Reads, examines, compares, writes.
 pub(super) fn diagnose_recordings(arguments: DiagnoseArguments) -> CommandResult {
     let (model, given) = read_inputs(&arguments)?;
+    let (given, long) = thin_input(given, arguments.rows.is_some());
     given.warnings.iter().for_each(|warning| eprintln!("{}", localize_text(warning)));
     let examination = twin::examine_recording(&given.recording, &model);
     let mut unusable = examination.unusable;
@@ -75,8 +79,30 @@ pub(super) fn diagnose_recordings(arguments: DiagnoseArguments) -> CommandResult
     if arguments.search {
         eprintln!("{}", diagnosis.debug);
     }
-    collect_outputs(&arguments).write(&diagnosis, &given.recording, &context).map_err(CannotRun::from_error)?;
+    let mut outputs = collect_outputs(&arguments);
+    if let Some(LongInput { whole, rows }) = long {
+        outputs
+            .write_rows(&diagnosis.rows.expand(&rows, whole.count_rows()), &diagnosis, &whole)
+            .map_err(CannotRun::from_error)?;
+        outputs.rows = None;
+    }
+    outputs.write(&diagnosis, &given.recording, &context).map_err(CannotRun::from_error)?;
     Ok(CommandOutcome::Fine)
+}
+
+/// A recording of which not every row is compared, where every row is to be written.
+struct LongInput {
+    whole: Recording,
+    /// The rows that are compared.
+    rows: Vec<usize>,
+}
+
+/// Of a long recording the rows that are compared; the whole is kept only where its rows are to be written.
+fn thin_input(mut given: InputRecordings, writes_rows: bool) -> (InputRecordings, Option<LongInput>) {
+    let Some(thinned) = twin::thin_recording(&given.recording) else { return (given, None) };
+    given.warnings.push(thinned.describe(given.recording.count_rows()));
+    let whole = std::mem::replace(&mut given.recording, thinned.recording);
+    (given, writes_rows.then_some(LongInput { whole, rows: thinned.rows }))
 }
 
 /// Model, hypotheses and recordings; every problem of all of them at once.
@@ -86,7 +112,7 @@ fn read_inputs(arguments: &DiagnoseArguments) -> Result<(Model, InputRecordings)
         arguments.model.as_ref().map(|path| read_model(path)).transpose().map_err(|wrong| problems.extend(wrong));
     let hypotheses = arguments.effects_dir.as_ref().map_or(Ok(Vec::new()), |directory| read_hypotheses(directory));
     let hypotheses = hypotheses.map_err(|wrong| problems.extend(wrong));
-    let given = read_recordings_as(&arguments.recording, arguments.map.as_ref());
+    let given = read_recordings_as(&arguments.recording, arguments.map.as_ref(), Copies::CountOnce);
     let given = given.map_err(|wrong| problems.extend(wrong.iter().map(|problem| localize_text(problem).to_owned())));
     let (Ok(model), Ok(hypotheses), Ok(mut given)) = (model, hypotheses, given) else {
         return Err(cannot_use(&problems));

@@ -6,6 +6,7 @@
 
 use super::beside::{BesideModel, Onset, beside_model, compose_headline};
 use super::context::DiagnosisContext;
+use super::order::Copies;
 use super::recordings::read_recordings_as;
 use super::series::{AlignBy, SimulatedSeries, attach_series, recorded_output, series_model};
 use super::store::DiagnosisStore;
@@ -177,7 +178,7 @@ fn read_input(job: &DiagnosisJob) -> Result<Compared, String> {
             let together =
                 |all: Vec<Bilingual>| all.into_iter().map(|problem| problem.en).collect::<Vec<_>>().join("; ");
             let mut model = Some(job.toml.as_str()).filter(|toml| !toml.is_empty()).map(parsed).transpose()?;
-            let given = read_recordings_as(&[path.display().to_string()], None).map_err(together)?;
+            let given = read_recordings_as(&[path.display().to_string()], None, Copies::CountOnce).map_err(together)?;
             let (mut recording, mut reading) = (given.recording, given.warnings);
             if let Some(text) = simulated {
                 let series = SimulatedSeries::from_text(text, AlignBy::Auto);
@@ -201,7 +202,11 @@ fn read_input(job: &DiagnosisJob) -> Result<Compared, String> {
 fn run_job(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), String> {
     let tell = |stage, rows| write_message(&ChildMessage::Stage(stage, rows)).map_err(|error| error.to_string());
     tell(Stage::Reading, 0)?;
-    let Compared { model, recording, reading, from_ns, to_ns } = read_input(job)?;
+    let Compared { model, mut recording, mut reading, from_ns, to_ns } = read_input(job)?;
+    if let Some(thinned) = twin::thin_recording(&recording) {
+        reading.push(thinned.describe(recording.count_rows()));
+        recording = thinned.recording;
+    }
     tell(Stage::Comparing, recording.count_rows())?;
     let examination = twin::examine_recording(&recording, &model);
     let context = DiagnosisContext::from_recording(&recording, &model, reading);

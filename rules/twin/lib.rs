@@ -36,11 +36,14 @@ pub mod plan;
 mod prepared_recording;
 pub mod quality;
 pub mod region;
+#[cfg(test)]
+mod robustness;
 pub mod simulate;
 pub mod speed_table;
 pub mod summary;
 pub mod term;
 pub mod text_report;
+mod thin;
 
 pub use departure::Departure;
 pub use diagnosis::Diagnosis;
@@ -48,4 +51,6 @@ pub use evidence::diagnose_recording;
 pub use examine::{Examination, examine_recording};
 pub use model::{Model, Parameter, Part, PartFunction, Simulated, simulate_parts};
 pub use model_file::{Problem, format_toml_text, parse_hypotheses, parse_model, write_model};
+pub use thin::{ThinnedRecording, thin_recording};
+
 use numerics::linear::columns as linear;

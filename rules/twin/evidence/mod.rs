@@ -33,6 +33,7 @@ mod outliers;
 mod posterior;
 mod posterior_means;
 mod recursive_least_squares;
+mod remainder;
 mod report;
 mod resampling;
 mod search;
@@ -98,7 +99,8 @@ pub fn diagnose_recording(recording: &Recording, model: &Model, seed: u64) -> Re
     };
     let inputs = RecordingInputs::new(&scene, &case.units, &case.held, mark_comparable_rows(&scene, &baseline));
     let bank = families::build_bank(&inputs, model);
-    let outliers = detect_outliers(&inputs, &bank, &baseline.tangents);
+    let mut outliers = detect_outliers(&inputs, &bank, &baseline.tangents);
+    outliers.dither_exact_output(&inputs);
     let compared =
         ComparisonInput { tangents: &baseline.tangents, recorded: &outliers.recorded, scale: &outliers.scale };
     let first = Comparison::new(&inputs, &bank, &compared, ROWS_MAX);
@@ -131,8 +133,10 @@ fn build_undecided_diagnosis(case: &Case<'_>, needed: &Bilingual) -> Diagnosis {
         alternatives: Vec::new(),
         baseline_shift: Vec::new(),
         data_quality: case.faults.clone(),
+        remainder: Vec::new(),
         next_experiment: Some(Experiment {
             statement: format!("Record {needed}."),
+            statement_zh: None,
             minutes: 10.0,
             effect: String::new(),
         }),
