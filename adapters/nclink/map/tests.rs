@@ -130,14 +130,15 @@ fn model_of(path: &str, unit: &str) -> Model {
     Model::parse(&json!({"devices": [node]})).expect("a model")
 }
 
+fn list_paths(rows: [(&'static str, &'static str, &'static str); 3], number: u32) -> impl Iterator<Item = String> {
+    rows.into_iter().flat_map(move |(item, other, _)| [item, other].map(|item| format!("AXIS@{number}/{item}")))
+}
+
 /// What is sampled says the same as what is asked for: for every channel that has a number, in every unit of the table.
 #[test]
 fn polled_and_sampled_numbers_are_right_or_absent_in_every_unit() {
     let fixed = FIXED.iter().filter(|(.., how)| matches!(how, How::Number)).map(|(path, ..)| (*path).to_owned());
-    let axis = |rows: [(&str, &str, &str); 3], number: u32| {
-        rows.into_iter().flat_map(move |(item, other, _)| [item, other].map(|item| format!("AXIS@{number}/{item}")))
-    };
-    let paths: Vec<String> = fixed.chain(axis(LINEAR, 0)).chain(axis(SPINDLE, 5)).collect();
+    let paths: Vec<String> = fixed.chain(list_paths(LINEAR, 0)).chain(list_paths(SPINDLE, 5)).collect();
     let (mut right, mut absent) = (0, 0);
     for path in &paths {
         for unit in adapter_core::channel::unit::list_symbols().chain(["furlong"]) {
