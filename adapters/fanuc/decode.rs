@@ -106,8 +106,23 @@ pub fn read_answer(item: FocasItem, dialect: impl Into<Dialect>, data: &[u8]) ->
         FocasItem::ToolGroup => tool_group(at)?,
         FocasItem::ToolLife(group) => records::read_tool_life(at, group)?,
     };
-    whole.check_end()?;
+    if !has_longer_form(item) {
+        whole.check_end()?;
+    }
     Ok(answer)
+}
+
+/// Single values whose beginning is their meaning: controls send more bytes behind them, and the vendor's library (1.0.5) reads the
+/// beginning all the same. An answer that is too short is refused as ever.
+fn has_longer_form(item: FocasItem) -> bool {
+    matches!(
+        item,
+        FocasItem::Feed
+            | FocasItem::SpindleSpeed
+            | FocasItem::Sequence
+            | FocasItem::Program
+            | FocasItem::ModalWord(_)
+    )
 }
 
 /// Which byte is which: what `libfwlib32` 1.0.5 makes of `000000fa 01020304` is flag 2 and 4 places.

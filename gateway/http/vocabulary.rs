@@ -49,6 +49,7 @@ const NO_ESTIMATES: [(&str, &str, &str); 29] = [
     ("place_not_learned", "not learned at this place yet", "此处尚未示教"),
     ("nothing_to_change", "the programmed feed is right", "无需调整进给"),
     ("power_unknown", "no power was measured", "未测得功率"),
+    ("control_silent", "the control does not answer, and the machine draws power", "数控系统无应答，而机床正在用电"),
     ("not_cutting", "nothing is being cut", "未切削"),
     ("output_missing", "the measured value is missing", "缺少测量值"),
     ("too_few_transients", "too few changes of spindle speed without cutting", "未切削时的主轴变速次数不足"),
