@@ -13,6 +13,7 @@ pub mod map_file;
 pub mod model_new;
 mod models;
 mod outputs;
+pub mod preview;
 mod recordings;
 pub mod report;
 pub mod series;

@@ -11,9 +11,7 @@ use super::rules::run_blocking;
 use crate::gallery;
 use adapters::bilingual::Bilingual;
 use adapters::channel::CHANNELS;
-use adapters::recording::read::preview_recording;
-use adapters::recording::read::preview_rows;
-use adapters::recording::{Mapping, NoteKind, TEXT_COLUMNS};
+use adapters::recording::{Mapping, TEXT_COLUMNS};
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{Path, Query as Pairs, State};
@@ -31,8 +29,6 @@ use serde_json::{Value, json};
 const FILE_MAX: usize = 32 << 20;
 /// A map, or the choice of a model.
 const BODY_MAX: usize = 256 << 10;
-/// Rows that are shown.
-const ROWS_SHOWN: usize = 6;
 
 pub(super) const ROUTES: &[Route] = &[
     Route::read("/api/v1/files", || get(serve_files)),
@@ -55,10 +51,6 @@ impl ServerState {
 
 fn describe_io_error(error: std::io::Error) -> ApiProblem {
     ApiProblem::unavailable(format!("the file cannot be kept: {error}"), "look at the data directory")
-}
-
-fn bilingual_to_json(text: &Bilingual) -> Value {
-    json!({ "en": text.en, "zh": text.zh })
 }
 
 /// `GET /api/v1/files`: what was brought, what was found, and what can be chosen.
@@ -131,49 +123,11 @@ async fn serve_file(State(shared): State<ServerState>, Path(key): Path<String>) 
 fn build_file_document(files: &FileDiagnoses, key: &str) -> Result<Value, ApiProblem> {
     let gone = || ApiProblem::not_found(&format!("a file {key:?} (the newest 20 are kept)"));
     let file = files.list_files().into_iter().find(|file| file.key == key).ok_or_else(gone)?;
-    let path = files.find_path(key).ok_or_else(gone)?;
-    let beside = Mapping::build_path_beside(&path);
-    let mapping = if beside.is_file() { Mapping::read(&beside).unwrap_or_default() } else { Mapping::default() };
-    let refused = |error: adapters::recording::RecordingError| {
-        let (en, zh) = (error.to_string(), error.describe_in_chinese());
-        let path = path.display().to_string();
-        json!({ "en": en.replace(&path, &file.name), "zh": zh.replace(&path, &file.name) })
-    };
-    let found = match preview_recording(&path, &mapping) {
-        Ok(found) => found,
-        Err(error) => {
-            return Ok(
-                json!({ "schema": "file/1", "key": key, "name": file.name, "columns": [], "error": refused(error) }),
-            );
-        }
-    };
-    let proposal = MapProposal::from_preview(&found);
-    let questions = proposal.open_questions();
-    let column = |(index, column): (usize, &ProposedColumn)| {
-        let known = found.columns.iter().find(|known| known.from == column.from);
-        json!({
-            "from": column.from, "to": column.to, "unit": known.and_then(|known| known.unit.clone()), "candidates": column.candidates,
-            "is_time": column.is_time, "asked": questions.contains(&index),
-        })
-    };
-    let columns: Vec<Value> = proposal.columns.iter().enumerate().map(column).collect();
-    let mut document =
-        json!({ "schema": "file/1", "key": key, "name": file.name, "bytes": file.bytes, "columns": columns });
-    match found.read {
-        Err(error) => document["error"] = refused(error),
-        Ok(read) => {
-            document["statement"] = bilingual_to_json(&read.describe_assumptions());
-            let notes = read.notes.iter().filter(|note| note.kind != NoteKind::Assumption);
-            document["notes"] = notes
-                .map(|note| json!({ "doubt": note.kind == NoteKind::Doubt, "en": note.text.en, "zh": note.text.zh }))
-                .collect();
-            document["rows"] = json!(read.recording.count_rows());
-            document["refused"] = json!(read.refused);
-            document["problems"] = read.problems.iter().take(5).map(ToString::to_string).collect();
-            let (head, rows) = preview_rows(&read.recording, ROWS_SHOWN);
-            document["head"] = json!(head);
-            document["first_rows"] = json!(rows);
-        }
+    let busy = |_| ApiProblem::unavailable("other files are being read", "ask again in some seconds");
+    let understood = files.describe_file(&file).map_err(busy)?;
+    let mut document = json!({ "schema": "file/1", "key": key, "name": file.name, "bytes": file.bytes });
+    if let (Value::Object(document), Value::Object(understood)) = (&mut document, understood) {
+        document.extend(understood);
     }
     Ok(document)
 }

@@ -2,6 +2,7 @@
 
 use super::slots::{Trial, VersionSlots};
 use super::{PACKAGE_SLOT, UpdateError};
+use gateway_base::files::read_text;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -16,6 +17,8 @@ pub const CONFIRM_WITHIN: Duration = Duration::from_secs(75);
 const COPY_WITHIN: Duration = Duration::from_secs(1_200);
 /// The file in the data directory in which the service confirms a version: the name of its slot.
 pub(super) const CONFIRMED: &str = "confirmed";
+/// The name of a version, and nothing longer, bytes.
+const CONFIRMED_MAX: usize = 256;
 
 /// How the service is started anew.
 pub trait ServiceControl {
@@ -95,7 +98,7 @@ fn wait_for_confirmation(slots: &VersionSlots, new: &str, confirmed: &Path, with
     let mut waits_since = started;
     let copying = confirmed.with_file_name(format!("history.db{}", gateway_history::COPYING));
     while waits_since.elapsed() < within {
-        if fs::read_to_string(confirmed).is_ok_and(|text| text == new) {
+        if read_text(confirmed, CONFIRMED_MAX).is_ok_and(|text| text == new) {
             return None;
         }
         if slots.running_slot().as_deref() != Some(new) {
