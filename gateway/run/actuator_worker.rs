@@ -5,7 +5,6 @@
 //! What waits while the controller takes its time is judged again when its turn comes: a verdict, a request or an order that
 //! has grown old, or whose arming has ended meanwhile, goes nowhere, and the tick is told.
 
-use super::history_store::StoredAudit;
 use super::priority::{self, Granted};
 use super::verdict_mailbox::VerdictMailbox;
 use adapters::Actuator;
@@ -53,10 +52,9 @@ pub enum ActuatorReport {
 }
 
 /// What the worker may write to.
-#[derive(Default)]
 pub struct Tools {
     /// Whether what is written is accounted for.
-    pub audit: StoredAudit,
+    pub audit: Arc<dyn AuditPath>,
     /// The way to the feed override.
     pub actuator: Option<Box<dyn Actuator>>,
     /// The way to the offsets.
@@ -65,7 +63,7 @@ pub struct Tools {
 
 /// The same with the account of what was written.
 pub struct Writers {
-    audit: StoredAudit,
+    audit: Arc<dyn AuditPath>,
     writer: Option<AnyWriter>,
     offsets: Option<OffsetAccount>,
 }

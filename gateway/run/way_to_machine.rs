@@ -39,7 +39,7 @@ pub(super) fn build_commands(
             .map(|(shifting, account)| (shifting, Some(account)))?,
         None => (OffsetCommands::without_sink(data_dir), None),
     };
-    let tools = Tools { audit, actuator, offsets };
+    let tools = Tools { audit: Arc::new(audit), actuator, offsets };
     let actuator_worker = match plan.speed {
         MachineSpeed::Real => ActuatorWorker::start(tools, limits, clock.clone(), open::tick_period(&plan.config))
             .map_err(|error| CannotRun::new(format!("no thread to write with: {error}"), ""))?,

@@ -23,15 +23,22 @@ use adapter_core::units::OverridePct;
 use adapter_core::{Actuator, LadderRequest, LadderRule, SourceError};
 use gateway_base::convert::saturate_to_ns as ns;
 use std::collections::VecDeque;
+use std::sync::Arc;
 use withdraw::Owed;
 
 /// A ladder waits for at least so many signs of life (`heartbeat_s` is at most a third of its patience).
 const HEARTBEATS_PATIENCE: i64 = 3;
 
 /// Where every write is accounted for. Something is written to the machine only while this is there.
-pub trait AuditPath: Send {
+pub trait AuditPath: Send + Sync {
     /// Is what is written now stored? Asked before each write, by the thread that writes.
     fn is_live(&self) -> bool;
+}
+
+impl AuditPath for Arc<dyn AuditPath> {
+    fn is_live(&self) -> bool {
+        (**self).is_live()
+    }
 }
 
 /// The audit was there a moment ago: what a write needs. Made by [`OverrideWriter::ask_audit`] only.

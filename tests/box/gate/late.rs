@@ -102,7 +102,7 @@ fn verdict(pct: u8, armed: bool) -> Verdict {
 fn actuator_worker(controller: &Controller, directory: &tempfile::TempDir) -> ActuatorWorker {
     let book = OffsetJournal::open(directory.path(), "test").expect("readable");
     let offsets = Some(OffsetAccount::new(Box::new(controller.clone()), book));
-    let tools = Tools { actuator: Some(Box::new(controller.clone())), offsets };
+    let tools = Tools { audit: stored().into(), actuator: Some(Box::new(controller.clone())), offsets };
     ActuatorWorker::start(tools, &limits(GateMode::Armed), Arc::new(SystemClock::new()), Duration::from_millis(100))
         .expect("a thread")
 }
