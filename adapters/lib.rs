@@ -36,7 +36,7 @@ pub mod worker;
 
 pub use adapter_core::{
     bilingual, channel, child, clock, conversion, driver, electric, histogram, merge, offset, own, plausibility,
-    reading, sample, serial, text, tls, unique_id, units, words,
+    reading, sample, serial, text, threads, tls, unique_id, units, words,
 };
 pub use fanuc;
 pub use fanuc_server;

@@ -117,11 +117,7 @@ pub fn read_answer(item: FocasItem, dialect: impl Into<Dialect>, data: &[u8]) ->
 fn has_longer_form(item: FocasItem) -> bool {
     matches!(
         item,
-        FocasItem::Feed
-            | FocasItem::SpindleSpeed
-            | FocasItem::Sequence
-            | FocasItem::Program
-            | FocasItem::ModalWord(_)
+        FocasItem::Feed | FocasItem::SpindleSpeed | FocasItem::Sequence | FocasItem::Program | FocasItem::ModalWord(_)
     )
 }
 

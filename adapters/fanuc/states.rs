@@ -287,7 +287,8 @@ mod tests {
         let with_steps = |steps: OrAbsence<i32>| {
             let ladder = [0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
             let steps = steps.map(|byte| [byte]);
-            Signals::new(Ok(&[0; 5]), Ok(&ladder), steps.as_ref().map(|byte| &byte[..]).map_err(|why| *why)).rapid_override()
+            Signals::new(Ok(&[0; 5]), Ok(&ladder), steps.as_ref().map(|byte| &byte[..]).map_err(|why| *why))
+                .rapid_override()
         };
         assert_eq!([with_steps(Ok(0xE1)), with_steps(Ok(0xFF)), with_steps(Ok(0x9B))], [Ok(30.0), Ok(0.0), Ok(100.0)]);
         assert_eq!(with_steps(Ok(0x61)), Ok(50.0), "HROV is off");

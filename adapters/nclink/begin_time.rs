@@ -106,7 +106,9 @@ mod tests {
 
     #[test]
     fn what_cannot_say_when_a_millisecond_was_is_refused() {
-        for value in [json!(1_795_829_024), json!("noon"), json!(1e30), json!("2026-13-28 01:23:44"), json!({}), json!(7.5)] {
+        for value in
+            [json!(1_795_829_024), json!("noon"), json!(1e30), json!("2026-13-28 01:23:44"), json!({}), json!(7.5)]
+        {
             assert_eq!(parse_begin(&value), None, "{value}");
         }
     }

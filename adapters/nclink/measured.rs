@@ -89,7 +89,8 @@ mod tests {
 
     #[test]
     fn a_number_is_in_the_unit_of_the_model_or_in_its_own() {
-        let of = |unit: Option<&str>, wanted: &str, value: Value| ItemConversion::new(unit, wanted).convert_value(&value);
+        let of =
+            |unit: Option<&str>, wanted: &str, value: Value| ItemConversion::new(unit, wanted).convert_value(&value);
         assert_eq!(of(Some("mA"), "A", json!(200)), Ok(0.2));
         assert_eq!(of(None, "A", json!("200 mA")), Ok(0.2));
         assert_eq!(of(Some("A"), "A", json!("200mA")), Ok(0.2), "what stands beside the number counts");

@@ -1,7 +1,7 @@
 //! What sample channels and events have brought: how much, and whether a millisecond is missing.
 
-use super::decode;
 use super::begin_time::ForeignClock;
+use super::decode;
 use super::sample::SampleBlock;
 use adapter_core::driver::{Fact, SourceProblem};
 use adapter_core::integer::widen_to_u64;
@@ -84,11 +84,13 @@ impl SampleTracks {
     pub(super) fn list_problems(&self) -> Vec<SourceProblem> {
         let unusable = self.why.as_ref().filter(|_| self.stands).map(|why| SourceProblem {
             what: format!("what the device sends on its sample channels cannot be used: {why}"),
-            next: "Correct the sample channel in the device's model or adapter; what is polled goes on without it".to_owned(),
+            next: "Correct the sample channel in the device's model or adapter; what is polled goes on without it"
+                .to_owned(),
         });
         let clock = self.clock.map(|clock| SourceProblem {
             what: format!("the device tells the times of its samples {}, not in milliseconds", clock.describe_form()),
-            next: "They are converted; the standard (GB/T 41970) has milliseconds since 1970 as \"beginTime\"".to_owned(),
+            next: "They are converted; the standard (GB/T 41970) has milliseconds since 1970 as \"beginTime\""
+                .to_owned(),
         });
         unusable.into_iter().chain(clock).collect()
     }

@@ -159,12 +159,7 @@ impl NcLinkSource {
 }
 
 impl NcLinkSession {
-    fn open(
-        link: &Link,
-        layout: NcLinkLayout,
-        own: &[Own<OwnPath>],
-        probed_ns: TimeNs,
-    ) -> Result<Self, SourceError> {
+    fn open(link: &Link, layout: NcLinkLayout, own: &[Own<OwnPath>], probed_ns: TimeNs) -> Result<Self, SourceError> {
         let mut connection = Connection::open(link, true)?;
         let model = connection.probe_model()?;
         let by_path = model.names_by_path();

@@ -61,7 +61,10 @@ impl SampledCurrent {
             Err(why) => {
                 let unit = column.unit.as_deref().unwrap_or_default();
                 self.problem = Some(SourceProblem {
-                    what: format!("the sampled current has no value: the device gives {} in {unit:?}, {why}", column.path),
+                    what: format!(
+                        "the sampled current has no value: the device gives {} in {unit:?}, {why}",
+                        column.path
+                    ),
                     next: "Correct the unit in the device's model".to_owned(),
                 });
                 return Vec::new();
@@ -142,7 +145,14 @@ mod tests {
             word: None,
         };
         let columns = vec![column("AXIS@0/MOTOR/CURRENT"), column("AXIS@5/MOTOR/CURRENT")];
-        sample::SampleBlock { channel: "s".to_owned(), begin_ms, interval_ms: 1.0, instants: values.len(), columns, clock: None }
+        sample::SampleBlock {
+            channel: "s".to_owned(),
+            begin_ms,
+            interval_ms: 1.0,
+            instants: values.len(),
+            columns,
+            clock: None,
+        }
     }
 
     #[test]
@@ -178,7 +188,8 @@ mod tests {
             of_unit.columns.iter_mut().for_each(|column| column.unit = Some(unit.to_owned()));
             let mut current = SampledCurrent::new(Some(5), 7.0);
             let found = current.extract_blocks(&of_unit, 3_000_000).first().map(|block| block.raw[0]);
-            let wanted = crate::conversion::find_conversion(unit, "A").map(|to_a| counts_of(to_a.convert_number(200.0)));
+            let wanted =
+                crate::conversion::find_conversion(unit, "A").map(|to_a| counts_of(to_a.convert_number(200.0)));
             assert_eq!(found, wanted, "{unit}");
             assert_eq!(current.problem().is_some(), wanted.is_none(), "{unit}");
             right += usize::from(found.is_some());

@@ -21,6 +21,7 @@ use crate::merge::{Merge, SourceId};
 use crate::plausibility::Plausibility;
 use crate::reading::Reading;
 use adapter_core::integer::saturate_to_wait_ns;
+use adapter_core::threads::reach_fault_point;
 use queue::Queue;
 use stats::WorkerCounters;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -118,7 +119,7 @@ impl Worker {
             asked_ns,
             plausibility: Plausibility::default(),
         };
-        let thread = std::thread::Builder::new().name("source".to_owned()).spawn(move || poller.run())?;
+        let thread = std::thread::Builder::new().name("source".to_owned()).spawn(move || poller.run_until_stopped())?;
         Ok(Self { name, shared, thread: Some(thread) })
     }
 
@@ -217,9 +218,18 @@ struct Poller {
 }
 
 impl Poller {
+    /// What breaks off outside of a poll costs that poll: the source is polled again.
+    fn run_until_stopped(&mut self) {
+        while catch_unwind(AssertUnwindSafe(|| self.run())).is_err() && !self.stopping() {
+            let (clock, pause_ns) = (self.clock.clone(), saturate_to_wait_ns(self.settings.backoff_min));
+            self.sleep_until(clock.now_ns().saturating_add(pause_ns));
+        }
+    }
+
     fn run(&mut self) {
         let mut due_ns = self.clock.now_ns();
         while !self.stopping() {
+            reach_fault_point("source");
             let readings = locked(&self.shared.queue).take_spare();
             let (began_ns, poll) = self.poll(readings);
             self.shared.steps.fetch_add(1, Ordering::Relaxed);

@@ -4,6 +4,7 @@
 use super::target::{BackupKind, keep_newest, list_own, remove_half_written};
 use super::{BackupPaths, BoxOrigin, RestoreError, RestoreRequest, collect_files, copy_history, restore_backup};
 use crate::archive::{pack, unpack};
+use adapter_core::threads::receive_work_within;
 use gateway_base::convert::seconds_to_instant;
 use gateway_base::log::{Notice, Severity};
 use gateway_config::BackupConfig;
@@ -211,7 +212,7 @@ fn run_schedule(
     let mut looks_to_wait = 0;
     // After the first one the time of this thread counts, which no clock that is set wrongly can move.
     let mut taken: Option<Instant> = None;
-    while matches!(stopped.recv_timeout(LOOK_EVERY), Err(RecvTimeoutError::Timeout)) {
+    while matches!(receive_work_within("backup", stopped, LOOK_EVERY), Err(RecvTimeoutError::Timeout)) {
         if looks_to_wait > 0 {
             looks_to_wait -= 1;
             continue;

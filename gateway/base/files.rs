@@ -5,6 +5,7 @@
 //! is writing it. What the box writes itself takes its place in one step, so that nobody ever finds half a file.
 
 use crate::owner;
+use adapter_core::threads::receive_work_within;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -104,8 +105,9 @@ impl<T: Send + 'static> Lookout<T> {
     ) -> std::io::Result<Self> {
         let (send, newest) = sync_channel(1);
         let (asked, asks) = sync_channel(1);
+        let thread = name.to_owned();
         let work = move || {
-            while let Some(asked) = wait_for_look(&asks, poll) {
+            while let Some(asked) = wait_for_look(&thread, &asks, poll) {
                 if look(asked).is_some_and(|found| send.send(found).is_err()) {
                     return;
                 }
@@ -128,9 +130,9 @@ impl<T: Send + 'static> Lookout<T> {
 }
 
 /// Waits for the next look; tells whether somebody asked for it. `None` when nobody is there any more.
-fn wait_for_look(asks: &Receiver<()>, poll: bool) -> Option<bool> {
+fn wait_for_look(thread: &str, asks: &Receiver<()>, poll: bool) -> Option<bool> {
     loop {
-        match asks.recv_timeout(LOOK_EVERY) {
+        match receive_work_within(thread, asks, LOOK_EVERY) {
             Ok(()) => return Some(true),
             Err(RecvTimeoutError::Timeout) if poll => return Some(false),
             Err(RecvTimeoutError::Timeout) => {}
@@ -142,9 +144,12 @@ fn wait_for_look(asks: &Receiver<()>, poll: bool) -> Option<bool> {
 /// The text of a file, but of a longer one only `limit` bytes and one more, by which its reader sees that it is longer.
 ///
 /// # Errors
-/// It cannot be read, or it is no UTF-8.
+/// It cannot be read, is a pipe or a device, or is no UTF-8.
 pub fn read_text(path: &Path, limit: usize) -> std::io::Result<String> {
     let mut text = String::new();
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "it is no regular file"));
+    }
     std::fs::File::open(path)?.take(limit as u64 + 1).read_to_string(&mut text)?;
     Ok(text)
 }

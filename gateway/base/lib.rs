@@ -4,6 +4,7 @@ pub mod cannot_run;
 pub mod clock;
 pub mod convert;
 pub mod files;
+pub mod limits;
 pub mod log;
 pub mod moment;
 pub mod owner;

@@ -25,6 +25,9 @@ pub(super) struct CheckArguments {
     /// Print everything that a script can see, call and set.
     #[arg(long, group = "print")]
     vocabulary: bool,
+    /// Within the limits of a process that reads for the page. Never given by a person.
+    #[arg(long, hide = true)]
+    limited: bool,
 }
 
 /// Checks, or prints a table.
@@ -54,6 +57,9 @@ fn read_declared_settings(config: Option<&Path>) -> Result<Vec<Declared>, Cannot
 }
 
 fn report_problems(arguments: &CheckArguments) -> CommandResult {
+    if arguments.limited {
+        gateway_base::limits::limit_memory_and_processor();
+    }
     let unreadable = arguments.config.as_deref().filter(|path| std::fs::File::open(path).is_err());
     if let Some(path) = unreadable {
         let problems = config::load(Some(path), []).err().unwrap_or_default();

@@ -58,8 +58,8 @@ pub(super) fn run(arguments: RunArguments, log: LogArguments) -> CommandResult {
 
 fn build_plan(arguments: RunArguments) -> Result<RunPlan, CannotRun> {
     let overrides = collect_overrides(&arguments);
-    let listen_in_environment = std::env::var_os(format!("{}HTTP__LISTEN", config::ENVIRONMENT_PREFIX)).is_some();
-    let port_named = arguments.config.is_some() || arguments.listen.is_some() || listen_in_environment;
+    // A person at the command line is told at once. A service polls, stores and writes whatever the page cannot open, and tries again.
+    let port_named = arguments.listen.is_some();
     let own = |name: &str| overrides.iter().any(|(key, _)| key == name);
     let environment =
         std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));

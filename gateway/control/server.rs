@@ -1,6 +1,7 @@
 //! Listens for orders and hands each to the tick, on a thread of its own: however busy the page is, an order is heard.
 
 use super::{LINE_MAX, Order, OrderSender, Reply, socket_path};
+use adapter_core::threads::reach_fault_point;
 use gateway_base::log::{Notice, Severity};
 use std::io;
 use std::os::unix::fs::PermissionsExt;
@@ -71,6 +72,7 @@ async fn accept_orders(listener: UnixListener, post: OrderSender) {
         let Ok(place) = room.clone().acquire_owned().await else { return };
         match listener.accept().await {
             Ok((stream, _)) => {
+                reach_fault_point("control");
                 let post = post.clone();
                 tokio::spawn(async move {
                     answer_order(stream, &post).await;

@@ -7,6 +7,7 @@
 use super::beside::{BesideModel, Onset, beside_model, compose_headline};
 use super::context::DiagnosisContext;
 use super::order::Copies;
+use super::preview::{self, PreviewJob};
 use super::recordings::read_recordings_as;
 use super::series::{AlignBy, SimulatedSeries, attach_series, recorded_output, series_model};
 use super::store::DiagnosisStore;
@@ -94,11 +95,21 @@ pub enum ChildMessage {
     Refused(String),
 }
 
+/// What a child may be asked for.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum ChildJob {
+    /// A diagnosis.
+    Diagnosis(Box<DiagnosisJob>),
+    /// How a file is understood.
+    Preview(PreviewJob),
+}
+
 /// Starts a child on a job.
 ///
 /// # Errors
 /// No process could be started.
-pub fn start(job: &DiagnosisJob) -> std::io::Result<Child> {
+pub fn start(job: &impl Serialize) -> std::io::Result<Child> {
     let program = if cfg!(target_os = "linux") { PathBuf::from("/proc/self/exe") } else { std::env::current_exe()? };
     let mut child = Command::new(program)
         .arg(COMMAND)
@@ -135,11 +146,18 @@ pub fn run() -> std::io::Result<()> {
     let mut line = String::new();
     let mut input = BufReader::new(std::io::stdin().take(LINE_MAX));
     input.read_line(&mut line)?;
-    let job: DiagnosisJob = serde_json::from_str(&line)?;
+    let job: ChildJob = serde_json::from_str(&line)?;
     std::thread::Builder::new().name("parent".to_owned()).spawn(move || {
         let _until_it_is_gone = std::io::copy(&mut input, &mut std::io::sink());
         std::process::exit(2);
     })?;
+    let job = match job {
+        ChildJob::Preview(job) => return preview::run_job(&job),
+        ChildJob::Diagnosis(job) => job,
+    };
+    if matches!(job.input, JobInput::File { .. }) {
+        gateway_base::limits::limit_memory();
+    }
     let outcome = run_job(&job)
         .map_or_else(ChildMessage::Refused, |(row, missing)| ChildMessage::Finished(Box::new(row), missing));
     write_message(&outcome)

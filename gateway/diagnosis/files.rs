@@ -2,16 +2,21 @@
 //! later. The work is done by the same child process as a diagnosis of the history, one at a time.
 
 use super::child::{DiagnosisJob, JobInput};
+use super::clicked_map::ClickedMap;
 use super::handle::{DiagnosisHandle, DiagnosisRefusal};
+use super::preview;
 use super::store::{DiagnosisStore, diagnosis_key};
 use super::worker::{DiagnosisRequest, in_child};
 use adapter_core::clock::TimeNs;
+use adapter_core::threads::receive_work;
 use gateway_base::files::compute_digest;
 use gateway_base::files::{read_text, replace_file};
 use recording::Mapping;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError, TryLockError};
+use std::time::{Duration, Instant};
 
 /// Files that are kept; of more the oldest goes.
 const FILES_MAX: usize = 20;
@@ -19,6 +24,16 @@ const FILES_MAX: usize = 20;
 const RESULTS_MAX: usize = 40;
 /// A longer index is not read, bytes.
 const INDEX_MAX: usize = 8 << 20;
+
+/// So long is waited for the files that others have asked for.
+const READ_WAIT: Duration = Duration::from_secs(8);
+/// Time between two looks whether it is over.
+const READ_LOOK: Duration = Duration::from_millis(20);
+
+/// Other files are being read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("other files are being read")]
+pub struct FilesBusy;
 
 /// A file that was brought.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -54,11 +69,24 @@ pub struct FileDiagnosis {
     pub diagnosis: serde_json::Value,
 }
 
+/// Why a map that was clicked is not kept.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum MapRefusal {
+    /// Other files are being read.
+    Busy,
+    /// The file would be read otherwise, or it is no map; in words.
+    Refused(String),
+}
+
 /// See the [module](self). Clones are handles of the same.
 #[derive(Debug, Clone)]
 pub struct FileDiagnoses {
     directory: PathBuf,
     handle: DiagnosisHandle,
+    /// Held while the list of files is changed.
+    list: Arc<Mutex<()>>,
+    /// Held while a file is read: one at a time, whoever asks.
+    reading: Arc<Mutex<()>>,
 }
 
 impl FileDiagnoses {
@@ -73,7 +101,7 @@ impl FileDiagnoses {
         // No machine runs beside a file: neither its model nor its history are there.
         let (model, history) = (directory.join("model.toml"), directory.join("history.db"));
         let handle = DiagnosisHandle::new(requests, model, history, kept);
-        let own = Self { directory, handle };
+        let own = Self { directory, handle, list: Arc::default(), reading: Arc::default() };
         let (index, kept) = (own.index(), own.handle.diagnosis_store().clone());
         // The thread holds no handle that could ask: it ends when the last one outside is gone.
         let state = own.handle.without_requests();
@@ -108,8 +136,11 @@ impl FileDiagnoses {
         let key = format!("{:016x}", compute_digest(bytes));
         let file = BroughtFile { key: key.clone(), name: sanitize_name(name), at_ms, bytes: bytes.len() };
         let folder = self.directory.join(&key);
+        let _guard = self.list.lock().unwrap_or_else(PoisonError::into_inner);
         std::fs::create_dir_all(&folder)?;
         std::fs::write(folder.join("data"), bytes)?;
+        // Whoever brings it again wants it read again.
+        preview::forget_answers(&folder.join("data"));
         let mut files = self.list_files();
         files.retain(|known| known.key != key);
         files.insert(0, file.clone());
@@ -127,11 +158,52 @@ impl FileDiagnoses {
         known.then(|| self.directory.join(key).join("data"))
     }
 
+    /// How a file is understood, as a document: read by a child process, once, and kept. A file that the child did not survive is set
+    /// aside and not read again until somebody brings it again or changes its map.
+    ///
+    /// # Errors
+    /// Other files are being read.
+    pub fn describe_file(&self, file: &BroughtFile) -> Result<serde_json::Value, FilesBusy> {
+        let path = self.directory.join(&file.key).join("data");
+        self.with_reading(|| preview::read_answer(&path), || preview::describe_in_child(&path, &file.name))
+    }
+
+    /// The map that a person clicked, as text, after the file was read back under it by a child process.
+    ///
+    /// # Errors
+    /// See [`MapRefusal`].
+    pub fn propose_map(&self, file: &BroughtFile, clicked: &ClickedMap) -> Result<String, MapRefusal> {
+        let path = self.directory.join(&file.key).join("data");
+        let read = || preview::propose_in_child(&path, &file.name, clicked);
+        self.with_reading(|| None, read).map_err(|FilesBusy| MapRefusal::Busy)?.map_err(MapRefusal::Refused)
+    }
+
+    /// What is known already, or what a child says when it is this one's turn.
+    fn with_reading<T>(&self, known: impl Fn() -> Option<T>, read: impl FnOnce() -> T) -> Result<T, FilesBusy> {
+        let until = Instant::now() + READ_WAIT;
+        loop {
+            if let Some(known) = known() {
+                return Ok(known);
+            }
+            match self.reading.try_lock() {
+                Ok(_guard) => return Ok(read()),
+                Err(TryLockError::Poisoned(held)) => {
+                    let _guard = held.into_inner();
+                    return Ok(read());
+                }
+                Err(TryLockError::WouldBlock) if Instant::now() >= until => return Err(FilesBusy),
+                Err(TryLockError::WouldBlock) => {}
+            }
+            std::thread::sleep(READ_LOOK);
+        }
+    }
+
     /// Puts a map beside a file.
     ///
     /// # Errors
     /// It cannot be written.
     pub fn set_map(&self, path: &Path, toml: &str) -> std::io::Result<()> {
+        preview::forget_answers(path);
         replace_file(&Mapping::build_path_beside(path), toml)
     }
 
@@ -176,7 +248,7 @@ fn read_results(index: &Path) -> Vec<FileDiagnosis> {
 }
 
 fn run_requests(asked: &Receiver<DiagnosisRequest>, handle: &DiagnosisHandle, kept: &DiagnosisStore, index: &Path) {
-    while let Ok(request) = asked.recv() {
+    while let Some(request) = receive_work("files", asked) {
         let DiagnosisRequest { toml, by, to_ns, file, .. } = request;
         let Some((path, simulated)) = file else { continue };
         let name = index.parent().map(|directory| name_of(directory, &path)).unwrap_or_default();

@@ -3,6 +3,7 @@
 
 pub mod beside;
 pub mod child;
+pub mod clicked_map;
 pub mod context;
 pub mod execute;
 pub mod files;
@@ -14,6 +15,7 @@ pub mod model_new;
 mod models;
 mod order;
 mod outputs;
+pub mod preview;
 mod recordings;
 pub mod report;
 pub mod series;

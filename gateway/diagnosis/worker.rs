@@ -7,6 +7,7 @@ use super::handle::DiagnosisHandle;
 use super::outputs;
 use super::store::{self, DiagnosisFile, DiagnosisStore};
 use adapter_core::clock::TimeNs;
+use adapter_core::threads::receive_work_within;
 use gateway_base::files::{LOOK_EVERY, Mark, Rest, read_mark};
 use gateway_history::Reader;
 use rules::twin::{self, Model, parse_model};
@@ -168,7 +169,7 @@ fn run_worker(
     going_on: &Weak<()>,
 ) {
     while going_on.strong_count() > 0 {
-        let report = match asked.recv_timeout(LOOK_EVERY) {
+        let report = match receive_work_within("twin", asked, LOOK_EVERY) {
             Ok(request) => Some(diagnose_stretch(request, places, diagnoses)),
             Err(RecvTimeoutError::Timeout) => file.read_if_changed(),
             Err(RecvTimeoutError::Disconnected) => return,

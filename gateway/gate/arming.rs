@@ -39,6 +39,8 @@ pub enum Disarmed {
     Silent,
     /// Nothing is being stored: what cannot be accounted for is not written.
     NoAudit,
+    /// A thread of the gateway broke off.
+    Thread,
 }
 
 impl Disarmed {
@@ -55,6 +57,7 @@ impl Disarmed {
             Self::Clock => "clock",
             Self::Silent => "silent",
             Self::NoAudit => "no_audit",
+            Self::Thread => "thread",
         }
     }
 }
@@ -70,6 +73,7 @@ impl fmt::Display for Disarmed {
             Self::Line => "the machine could not be reached",
             Self::Clock => "the clock of the box was set",
             Self::NoAudit => "the history takes nothing, so nothing can be accounted for",
+            Self::Thread => "a thread of the gateway broke off",
             Self::Silent => "no fresh values from the machine for ten seconds",
         })
     }
@@ -94,6 +98,11 @@ pub enum ArmError {
     /// What is written could not be accounted for.
     #[error("the gate cannot be armed: the history takes nothing at the moment; `cnc-gateway history info` says more")]
     NoAudit,
+    /// A thread that is needed broke off and is not started again.
+    #[error(
+        "the gate cannot be armed: the thread {0:?} of the gateway broke off; start the gateway again, and report it with the log"
+    )]
+    ThreadGone(String),
 }
 
 #[derive(Debug)]
@@ -103,6 +112,8 @@ pub(super) struct Arming {
     state: Result<Armed, Disarmed>,
     /// When there were fresh values last, or the gate was armed.
     fresh_ns: TimeNs,
+    /// The thread whose end forbids arming.
+    gone: Option<String>,
 }
 
 /// Without fresh values for this long, somebody has to look before the gate writes again.
@@ -111,12 +122,15 @@ const SILENT_NS: i64 = 10 * SECOND_NS;
 impl Arming {
     pub(super) fn new(mode: GateMode, lasts: Duration) -> Self {
         let lasts_ns = saturate_to_ns(lasts);
-        Self { mode, lasts_ns, state: Err(Disarmed::Start), fresh_ns: TimeNs::MIN }
+        Self { mode, lasts_ns, state: Err(Disarmed::Start), fresh_ns: TimeNs::MIN, gone: None }
     }
 
     pub(super) fn arm(&mut self, by: &str, lasts: Option<Duration>, at_ns: TimeNs) -> Result<&Armed, ArmError> {
         if self.mode != GateMode::Armed {
             return Err(ArmError::Mode(self.mode.as_word()));
+        }
+        if let Some(thread) = &self.gone {
+            return Err(ArmError::ThreadGone(thread.clone()));
         }
         if by.trim().is_empty() {
             return Err(ArmError::Nobody);
@@ -129,6 +143,11 @@ impl Arming {
         self.fresh_ns = at_ns;
         self.state = Ok(Armed { by: by.trim().to_owned(), since_ns: at_ns, until_ns });
         self.state.as_ref().map_err(|_| ArmError::Nobody)
+    }
+
+    pub(super) fn forbid_arming(&mut self, thread: &str) {
+        self.gone.get_or_insert_with(|| thread.to_owned());
+        self.disarm(Disarmed::Thread);
     }
 
     pub(super) fn disarm(&mut self, why: Disarmed) {

@@ -113,6 +113,10 @@ const DRY_RUN: ChannelId = ChannelId::named("dry_run");
 const OPERATION: ChannelId = ChannelId::named("operation");
 const BLOCK: ChannelId = ChannelId::named("block");
 
+/// What a decision needs to know of the machine that is written to: only that machine itself can tell it.
+pub const EVIDENCE: [ChannelId; 10] =
+    [MODE, EXECUTION, FEED, SPEED, ALARM, RAPID, SINGLE_BLOCK, DRY_RUN, OPERATION, BLOCK];
+
 /// Without a fresh value of each of these nothing is known of the machine.
 const NEEDED: [ChannelId; 4] = [MODE, EXECUTION, FEED, SPEED];
 /// A controller may not have these at all; one that has them and is silent is another matter.

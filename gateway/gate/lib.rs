@@ -37,11 +37,11 @@ mod write;
 pub use arming::{ArmError, Armed, Disarmed};
 pub use ask::{AskOutcome, ScriptRequest};
 pub use fault::{Fault, UnexpectedReading};
-pub use hold::Hold;
+pub use hold::{EVIDENCE, Hold};
 pub use limit::Bound;
 pub use offset::{OffsetVerdict, Offsets};
 pub use verdict::{GateOutcome, Verdict};
-pub use write::{Occasion, OverrideWriter, Reaction, WriteRecord};
+pub use write::{AuditPath, Occasion, OverrideWriter, Reaction, WriteRecord};
 
 use crate::limits::{GateConfig, GateMode};
 use adapter_core::clock::{SECOND_NS, TimeNs};
@@ -103,6 +103,11 @@ impl Gate {
     /// The configuration does not allow it, or nobody is named.
     pub fn arm(&mut self, by: &str, lasts: Option<Duration>, at_ns: TimeNs) -> Result<&Armed, ArmError> {
         self.arming.arm(by, lasts, at_ns)
+    }
+
+    /// From now on nobody can arm: a thread of this name is gone, and somebody has to start the gateway again.
+    pub fn forbid_arming(&mut self, thread: &str) {
+        self.arming.forbid_arming(thread);
     }
 
     /// Ends the permission to write. The writer restores 100 % at the next verdict, which is not armed even when somebody

@@ -122,4 +122,4 @@ pub use space::{DiskRoom, disk_room};
 pub use sql::SQL_WITHIN;
 pub use status::HistoryFigures;
 pub use wear_models::{StoredWearModel, store_wear_model, store_wear_models};
-pub use writer::Writer;
+pub use writer::{Writer, WriterLife};

@@ -242,6 +242,11 @@ impl Mailbox {
         self.progressed.notify_all();
     }
 
+    /// Is there nobody to write any more?
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.lock_state().stopped
+    }
+
     pub(crate) fn measure_queue(&self) -> QueueFigures {
         let state = self.lock_state();
         QueueFigures {

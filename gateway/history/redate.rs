@@ -16,11 +16,15 @@ use super::record_sql::add_to_state_hours;
 use super::recover::recover_file;
 use super::schema;
 use super::segments::{RECORD_TABLES, RecordMarks};
-use adapter_core::clock::TimeNs;
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_base::clock::{ClockMark, Trust, format_span};
 use rusqlite::{Connection, OptionalExtension, params};
 use std::ops::Range;
 use std::path::Path;
+
+/// A clock that was wrong by no more than this was right: between two starts a time server moves it by some milliseconds, and reading it
+/// twice takes some nanoseconds. Dating rows anew for that would change nothing that anybody reads.
+const WRONG_NS: i64 = SECOND_NS;
 
 /// What was dated anew.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -106,11 +110,11 @@ fn find_misdated(db: &Connection, mark: &ClockMark) -> Result<Vec<Misdated>, His
         .prepare(
             "SELECT s.id, s.first_row, s.anchor_ns, s.marks, n.first_row, n.marks
              FROM segments s LEFT JOIN segments n ON n.id = (SELECT min(id) FROM segments WHERE id > s.id)
-             WHERE s.boot = ?1 AND s.clock IN ('unset', 'plausible') AND s.anchor_ns <> ?2 ORDER BY s.id",
+             WHERE s.boot = ?1 AND s.clock IN ('unset', 'plausible') AND abs(s.anchor_ns - ?2) > ?3 ORDER BY s.id",
         )
         .with_activity("looking for rows to date anew")?;
     let marks = |text: Option<String>| text.and_then(|text| serde_json::from_str::<RecordMarks>(&text).ok());
-    let rows = statement.query_map(params![mark.boot, mark.anchor_ns], |row| {
+    let rows = statement.query_map(params![mark.boot, mark.anchor_ns, WRONG_NS], |row| {
         let (first, next): (i64, Option<i64>) = (row.get(1)?, row.get(4)?);
         Ok(Misdated {
             id: row.get(0)?,

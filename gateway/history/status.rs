@@ -102,6 +102,11 @@ impl SharedStatus {
         self.texts.lock().unwrap_or_else(PoisonError::into_inner).degraded = None;
     }
 
+    /// Is nothing becoming durable?
+    pub(crate) fn is_degraded(&self) -> bool {
+        self.texts.lock().unwrap_or_else(PoisonError::into_inner).degraded.is_some()
+    }
+
     /// Nothing is becoming durable, because of `error`.
     pub(crate) fn mark_degraded(&self, error: &str) {
         let mut words = self.texts.lock().unwrap_or_else(PoisonError::into_inner);

@@ -12,6 +12,7 @@ use super::record_sql::close_state;
 use super::segments;
 use super::status::SharedStatus;
 use adapter_core::clock::TimeNs;
+use adapter_core::threads::reach_fault_point;
 use gateway_base::clock::Trust;
 use rusqlite::Connection;
 use std::sync::Arc;
@@ -68,6 +69,7 @@ impl Thread {
         let _guard = StopGuard(self.mailbox.clone());
         loop {
             self.shared.rounds.fetch_add(1, Ordering::Relaxed);
+            reach_fault_point("history");
             let rows_too = self.takes_rows();
             let delivery = self.receive_delivery(rows_too);
             let closing = delivery.closing && delivery.batches.is_empty();

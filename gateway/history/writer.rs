@@ -24,6 +24,21 @@ use std::time::Duration;
 /// How long a flush waits when nobody says otherwise.
 const FLUSH_LIMIT: Duration = Duration::from_secs(30);
 
+/// Whether a [`Writer`] takes what is handed in, for whoever holds no writer. It outlives the writer, and says no from then on.
+#[derive(Debug, Clone)]
+pub struct WriterLife {
+    mailbox: Arc<Mailbox>,
+    shared: Arc<SharedStatus>,
+}
+
+impl WriterLife {
+    /// Is the thread there, and does the disk take what it writes?
+    #[must_use]
+    pub fn is_live(&self) -> bool {
+        !self.mailbox.is_stopped() && !self.shared.is_degraded()
+    }
+}
+
 /// Writes one history. All methods take `&self` and may be called from any thread; dropping the handle makes what was
 /// handed in durable and ends the writer thread.
 #[derive(Debug)]
@@ -155,6 +170,18 @@ impl Writer {
     #[must_use]
     pub fn count_rounds(&self) -> u64 {
         self.shared.rounds.load(std::sync::atomic::Ordering::Relaxed)
+    }
+
+    /// Whether it takes what is handed in, at any later moment.
+    #[must_use]
+    pub fn life(&self) -> WriterLife {
+        WriterLife { mailbox: self.mailbox.clone(), shared: self.shared.clone() }
+    }
+
+    /// Has the thread ended, which it does by itself only when it breaks off?
+    #[must_use]
+    pub fn is_stopped(&self) -> bool {
+        self.mailbox.is_stopped()
     }
 
     /// Path of the database that is written.

@@ -8,6 +8,7 @@
 //! file whose content is sent as a password: who may edit the page may not read every file of the box.
 
 use super::ServerState;
+use super::check_child::check_text as check_text_in_child;
 use super::guard::with_audit_note;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
@@ -77,8 +78,9 @@ fn parse_text(path: &Path, text: &str) -> Result<Config, Vec<Problem>> {
     config::parse(&path.display().to_string(), text, base, [])
 }
 
+/// Everything that `check` finds in the text and in what it names.
 fn find_problems(path: &Path, text: &str) -> Vec<Problem> {
-    parse_text(path, text).err().unwrap_or_default()
+    parse_text(path, text).err().unwrap_or_else(|| check_text_in_child(path, text))
 }
 
 /// Parts of an address that open a way to write, or name a file to load into a process or to send to a receiver.

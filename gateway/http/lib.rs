@@ -8,6 +8,7 @@
 //! demands stands in the row of the table of routes, see [`Route`].
 
 mod backtests;
+mod check_child;
 mod configuration_file;
 mod connection;
 mod description;
@@ -223,6 +224,9 @@ pub fn build_router(shared: ServerState) -> Router {
         router.route(route.path(), route.method_router().route_layer(from_fn_with_state(guarded, guard_route)))
     });
     let routes = routes
+        // How long a body may be stands in the row of its route, and the guard has read it by then: the library's own limit of 2 MB
+        // would be another one.
+        .layer(axum::extract::DefaultBodyLimit::disable())
         .fallback(|uri: Uri| async move { ApiProblem::not_found(uri.path()) })
         .layer(from_fn(in_our_words))
         .layer(CompressionLayer::new())
@@ -262,6 +266,7 @@ async fn serve_description() -> Response {
 
 /// `GET /healthz`: 200 while the tick goes on, 503 with the reason otherwise.
 async fn serve_health(axum::extract::State(shared): axum::extract::State<ServerState>) -> Response {
+    adapters::threads::reach_fault_point("serve");
     let Some(age) = shared.live.borrow().as_ref().map(|published| published.at.elapsed()) else {
         return ApiProblem::unavailable("the box is starting", "ask again in a second").into_response();
     };

@@ -1,6 +1,6 @@
 //! The listening socket: bound before anything else starts when the user asked for it, retried otherwise.
 
-use super::{Certificate, ServerState, build_router, connection};
+use super::{Certificate, CertificateError, ServerState, build_router, connection};
 use gateway_base::log::{Notice, Severity};
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -38,12 +38,13 @@ pub struct Server {
 }
 
 impl Server {
-    /// Serves on `listener`, or keeps trying to open `listen` when there is none; over TLS where there is a `certificate`.
+    /// Serves on `listener`, or keeps trying to open `listen` when there is none; over TLS where `certificate` gives one, asked
+    /// again and again while it cannot be read.
     /// `report` says why nothing listens while that is so.
     #[must_use]
     pub fn start(
         (listen, listener): (SocketAddr, Option<TcpListener>),
-        certificate: Option<Certificate>,
+        certificate: impl Fn() -> Result<Option<Certificate>, CertificateError> + Send + Sync + 'static,
         shared: ServerState,
         report: watch::Sender<Option<String>>,
     ) -> Self {
@@ -61,11 +62,15 @@ impl Server {
 
 async fn serve_until_stopped(
     (listen, listener): (SocketAddr, Option<TcpListener>),
-    certificate: Option<Certificate>,
+    load_certificate: impl Fn() -> Result<Option<Certificate>, CertificateError> + Send + Sync,
     shared: ServerState,
     mut stopped: watch::Receiver<bool>,
     report: watch::Sender<Option<String>>,
 ) {
+    let certificate = tokio::select! {
+        loaded = keep_loading(&load_certificate, &report) => loaded,
+        _ = stopped.wait_for(|stop| *stop) => return,
+    };
     let listener = match listener {
         Some(listener) => listener,
         None => tokio::select! {
@@ -98,8 +103,25 @@ async fn keep_trying(listen: SocketAddr, report: &watch::Sender<Option<String>>)
     }
 }
 
+/// A certificate that is missing today may be there tomorrow: somebody is renewing it, or its disk is not mounted yet.
+async fn keep_loading(
+    load_certificate: &(impl Fn() -> Result<Option<Certificate>, CertificateError> + Send + Sync),
+    report: &watch::Sender<Option<String>>,
+) -> Option<Certificate> {
+    loop {
+        match load_certificate() {
+            Ok(certificate) => return certificate,
+            Err(error) => say_trouble(report, error.to_string(), ("no_certificate", String::new())),
+        }
+        tokio::time::sleep(RETRY).await;
+    }
+}
+
 fn say_once(report: &watch::Sender<Option<String>>, listen: SocketAddr, error: &std::io::Error) {
-    let trouble = port_trouble(listen, error);
+    say_trouble(report, port_trouble(listen, error), ("port_in_use", error.to_string()));
+}
+
+fn say_trouble(report: &watch::Sender<Option<String>>, trouble: String, (code, detail): (&'static str, String)) {
     let new = report.send_if_modified(|known| {
         let changed = known.as_ref() != Some(&trouble);
         *known = Some(trouble.clone());
@@ -107,6 +129,6 @@ fn say_once(report: &watch::Sender<Option<String>>, listen: SocketAddr, error: &
     });
     if new {
         let text = format!("{trouble}: no page for now. Polling goes on; trying again every {} s", RETRY.as_secs());
-        Notice::new(Severity::Warning, "port_in_use", text).with_detail(error.to_string()).write_to_logs();
+        Notice::new(Severity::Warning, code, text).with_detail(detail).write_to_logs();
     }
 }

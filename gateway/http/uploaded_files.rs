@@ -11,17 +11,16 @@ use super::rules::run_blocking;
 use crate::gallery;
 use adapters::bilingual::Bilingual;
 use adapters::channel::CHANNELS;
-use adapters::recording::read::{Preview, TimePreview, preview_recording, preview_rows};
-use adapters::recording::{Mapping, NoteKind, TEXT_COLUMNS};
+use adapters::recording::{Mapping, TEXT_COLUMNS};
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{Path, Query as Pairs, State};
 use axum::response::Response;
 use axum::routing::{delete, get, post, put};
 use gateway_access::Role;
-use gateway_diagnosis::files::{BroughtFile, FileDiagnoses, FileDiagnosis};
+use gateway_diagnosis::clicked_map::ClickedMap;
+use gateway_diagnosis::files::{BroughtFile, FileDiagnoses, FileDiagnosis, MapRefusal};
 use gateway_diagnosis::handle::DiagnosisHandle;
-use gateway_diagnosis::map_file::{MapProposal, ProposedColumn, verify_proposal};
 use gateway_diagnosis::model_new::{KINDS, MATERIALS, ModelKind, NewModel};
 use rules::twin::format_toml_text;
 use serde::Deserialize;
@@ -31,8 +30,6 @@ use serde_json::{Value, json};
 const FILE_MAX: usize = 32 << 20;
 /// A map, or the choice of a model.
 const BODY_MAX: usize = 256 << 10;
-/// Rows that are shown.
-const ROWS_SHOWN: usize = 6;
 
 pub(super) const ROUTES: &[Route] = &[
     Route::read("/api/v1/files", || get(serve_files)),
@@ -55,10 +52,6 @@ impl ServerState {
 
 fn describe_io_error(error: std::io::Error) -> ApiProblem {
     ApiProblem::unavailable(format!("the file cannot be kept: {error}"), "look at the data directory")
-}
-
-fn bilingual_to_json(text: &Bilingual) -> Value {
-    json!({ "en": text.en, "zh": text.zh })
 }
 
 /// `GET /api/v1/files`: what was brought, what was found, and what can be chosen.
@@ -130,125 +123,13 @@ async fn serve_file(State(shared): State<ServerState>, Path(key): Path<String>) 
 fn build_file_document(files: &FileDiagnoses, key: &str) -> Result<Value, ApiProblem> {
     let gone = || ApiProblem::not_found(&format!("a file {key:?} (the newest 20 are kept)"));
     let file = files.list_files().into_iter().find(|file| file.key == key).ok_or_else(gone)?;
-    let path = files.find_path(key).ok_or_else(gone)?;
-    let beside = Mapping::build_path_beside(&path);
-    let mapping = if beside.is_file() { Mapping::read(&beside).unwrap_or_default() } else { Mapping::default() };
-    let refused = |error: adapters::recording::RecordingError| {
-        let (en, zh) = (error.to_string(), error.describe_in_chinese());
-        let path = path.display().to_string();
-        json!({ "en": en.replace(&path, &file.name), "zh": zh.replace(&path, &file.name) })
-    };
-    let found = match preview_recording(&path, &mapping) {
-        Ok(found) => found,
-        Err(error) => {
-            return Ok(
-                json!({ "schema": "file/1", "key": key, "name": file.name, "columns": [], "error": refused(error) }),
-            );
-        }
-    };
-    let proposal = MapProposal::from_preview(&found, &mapping);
-    let questions = proposal.open_questions();
-    let column = |(index, column): (usize, &ProposedColumn)| {
-        let known = found.columns.iter().find(|known| known.from == column.from);
-        json!({
-            "from": column.from, "name": column.name, "to": column.to, "unit": known.and_then(|known| known.unit.clone()), "candidates": column.candidates,
-            "is_time": column.is_time, "asked": questions.contains(&index),
-        })
-    };
-    let columns: Vec<Value> = proposal.columns.iter().enumerate().map(column).collect();
-    let mut document =
-        json!({ "schema": "file/1", "key": key, "name": file.name, "bytes": file.bytes, "columns": columns });
-    match found.read {
-        Err(error) => document["error"] = refused(error),
-        Ok(read) => {
-            document["statement"] = bilingual_to_json(&read.describe_assumptions());
-            let notes = read.notes.iter().filter(|note| note.kind != NoteKind::Assumption);
-            document["notes"] = notes
-                .map(|note| json!({ "doubt": note.kind == NoteKind::Doubt, "en": note.text.en, "zh": note.text.zh }))
-                .collect();
-            document["rows"] = json!(read.recording.count_rows());
-            document["refused"] = json!(read.refused);
-            document["problems"] = read.problems.iter().take(5).map(ToString::to_string).collect();
-            let (head, rows) = preview_rows(&read.recording, ROWS_SHOWN);
-            document["head"] = json!(head);
-            document["first_rows"] = json!(rows);
-        }
+    let busy = |_| ApiProblem::unavailable("other files are being read", "ask again in some seconds");
+    let understood = files.describe_file(&file).map_err(busy)?;
+    let mut document = json!({ "schema": "file/1", "key": key, "name": file.name, "bytes": file.bytes });
+    if let (Value::Object(document), Value::Object(understood)) = (&mut document, understood) {
+        document.extend(understood);
     }
     Ok(document)
-}
-
-/// The map of a file, as a person clicked it.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ClickedMap {
-    columns: Vec<ClickedColumn>,
-    #[serde(default)]
-    time: String,
-    #[serde(default)]
-    zone: String,
-    #[serde(default)]
-    time_unit: String,
-    #[serde(default)]
-    order: String,
-    #[serde(default)]
-    decimal: String,
-    /// Seconds from one row to the next, where no column is the time.
-    #[serde(default)]
-    step: Option<f64>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ClickedColumn {
-    from: String,
-    to: String,
-    #[serde(default)]
-    unit: String,
-}
-
-impl ClickedMap {
-    /// As a map: what is not said here stays as the file was understood.
-    fn to_toml(&self, base: &Mapping, found: &TimePreview) -> String {
-        let columns = self.columns.iter().map(|column| ProposedColumn {
-            from: column.from.clone(),
-            name: column.from.clone(),
-            to: Some(column.to.clone()),
-            unit: Some(column.unit.clone()).filter(|unit| !unit.is_empty()),
-            candidates: Vec::new(),
-            is_time: false,
-        });
-        let said = |text: &String| Some(text.clone()).filter(|text| !text.is_empty());
-        let mut base = base.clone();
-        base.column.clear();
-        for (to, text) in [
-            (&mut base.time.zone, &self.zone),
-            (&mut base.time.unit, &self.time_unit),
-            (&mut base.time.order, &self.order),
-        ] {
-            *to = said(text).or(to.take());
-        }
-        base.decimal = self.decimal.chars().next().or(base.decimal);
-        let proposal = MapProposal {
-            columns: columns.collect(),
-            time: said(&self.time),
-            step: self.step,
-            found: found.clone(),
-            base,
-        };
-        proposal.to_toml(&Bilingual::default(), "the file")
-    }
-
-    /// Every column, by the name it has and the one it gets: a person has looked at all of them.
-    fn list_names(&self, found: &Preview) -> Vec<String> {
-        let before = found.columns.iter().filter_map(|column| column.to.clone());
-        self.columns.iter().map(|column| column.to.clone()).chain(before).collect()
-    }
-
-    /// The time was said by the person who clicked.
-    fn says_time(&self) -> bool {
-        self.step.is_some()
-            || [&self.time, &self.zone, &self.time_unit, &self.order].iter().any(|text| !text.is_empty())
-    }
 }
 
 /// `PUT /api/v1/files/{key}/map`: keeps how the columns of a file are to be read.
@@ -261,19 +142,14 @@ async fn map(
     let files = shared.require_files()?.clone();
     let words = format!("file {key}: its map");
     let document = run_blocking(move || {
-        let path = files.find_path(&key).ok_or_else(|| ApiProblem::not_found(&format!("a file {key:?}")))?;
-        let beside = Mapping::build_path_beside(&path);
-        let base = if beside.is_file() { Mapping::read(&beside).unwrap_or_default() } else { Mapping::default() };
-        let found = preview_recording(&path, &base).ok();
-        let time = found.as_ref().map(|found| found.time.clone()).unwrap_or_default();
-        let toml = clicked.to_toml(&base, &time);
         let refuse = |text: String| ApiProblem::bad_request(text, "change the choice that is named");
-        Mapping::parse(&toml, "the map").map_err(|wrong| refuse(wrong.to_string()))?;
-        // Of the columns a person decides; the times stay as they are read unless something was said of them.
-        if let Some(found) = found.filter(|_| !clicked.says_time() && clicked.decimal.is_empty()) {
-            verify_proposal(&path, &toml, &found, &clicked.list_names(&found))
-                .map_err(|error| refuse(error.to_string()))?;
-        }
+        let file = files.list_files().into_iter().find(|file| file.key == key);
+        let file = file.ok_or_else(|| ApiProblem::not_found(&format!("a file {key:?}")))?;
+        let path = files.find_path(&key).ok_or_else(|| ApiProblem::not_found(&format!("a file {key:?}")))?;
+        let toml = files.propose_map(&file, &clicked).map_err(|refusal| match refusal {
+            MapRefusal::Busy => ApiProblem::unavailable("other files are being read", "ask again in some seconds"),
+            MapRefusal::Refused(why) => refuse(why),
+        })?;
         files.set_map(&path, &toml).map_err(describe_io_error)?;
         build_file_document(&files, &key)
     })

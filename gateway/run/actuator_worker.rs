@@ -9,9 +9,10 @@ use super::priority::{self, Granted};
 use super::verdict_mailbox::VerdictMailbox;
 use adapters::Actuator;
 use adapters::clock::{Clock, ManualClock, TimeNs};
+use adapters::threads::reach_fault_point;
 use gateway_config as config;
 use gateway_gate::offset::{Moved, OffsetAccount, OffsetOrder};
-use gateway_gate::{Fault, OverrideWriter, Reaction, ScriptRequest, Verdict, WriteRecord};
+use gateway_gate::{AuditPath, Fault, OverrideWriter, Reaction, ScriptRequest, Verdict, WriteRecord};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread::JoinHandle;
@@ -51,8 +52,9 @@ pub enum ActuatorReport {
 }
 
 /// What the worker may write to.
-#[derive(Default)]
 pub struct Tools {
+    /// Whether what is written is accounted for.
+    pub audit: Arc<dyn AuditPath>,
     /// The way to the feed override.
     pub actuator: Option<Box<dyn Actuator>>,
     /// The way to the offsets.
@@ -61,13 +63,17 @@ pub struct Tools {
 
 /// The same with the account of what was written.
 pub struct Writers {
+    audit: Arc<dyn AuditPath>,
     writer: Option<AnyWriter>,
     offsets: Option<OffsetAccount>,
 }
 
 impl Writers {
     fn from_tools(tools: Tools, limits: &config::GateConfig) -> Self {
-        Self { writer: tools.actuator.map(|actuator| OverrideWriter::new(actuator, limits)), offsets: tools.offsets }
+        let Tools { audit, actuator, offsets } = tools;
+        let of_writer = audit.clone();
+        let writer = actuator.map(|actuator| OverrideWriter::new(actuator, Box::new(of_writer), limits));
+        Self { audit, writer, offsets }
     }
 
     fn is_waiting(&self) -> bool {
@@ -211,11 +217,19 @@ impl Remote {
     }
 }
 
+/// Whatever ends the tick gives the machine back.
+impl Drop for Remote {
+    fn drop(&mut self) {
+        self.close(&mut |_| {});
+    }
+}
+
 fn run_worker(mut writers: Writers, mailbox: &VerdictMailbox, clock: &dyn Clock, say: &SyncSender<ActuatorReport>) {
     // The tick tells what is granted; it is the same for both.
     let awake = priority::request_priority() == Granted::RealTime;
     let mut heard = true;
     while heard {
+        reach_fault_point("gate");
         let (verdict, closing) = mailbox.take_verdict(if writers.is_waiting() { LOOK_EVERY } else { REST }, awake);
         let mut tell = |said| heard &= say.try_send(said).is_ok();
         while let Some((it, in_time)) = mailbox.next_ask() {
@@ -270,5 +284,8 @@ fn write(writers: &mut Writers, verdict: Option<&Verdict>, clock: &dyn Clock, te
 
 fn carry_out_shift(writers: &mut Writers, order: OffsetOrder, clock: &dyn Clock, tell: &mut dyn FnMut(ActuatorReport)) {
     let Some(offsets) = &mut writers.offsets else { return };
+    if matches!(order, OffsetOrder::Shift { .. }) && !writers.audit.is_live() {
+        return tell(ActuatorReport::Withdrawn(order));
+    }
     tell(ActuatorReport::Moved(Box::new(offsets.carry_out(order, clock))));
 }

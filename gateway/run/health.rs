@@ -124,7 +124,7 @@ impl Health {
     /// Does the history take anything at the moment?
     #[must_use]
     pub fn is_storing(&self) -> bool {
-        self.stores
+        self.stores && self.history_store.is_storing()
     }
 
     /// From now on these lags are stored with every sample, after the values of the pipeline, and what has happened to

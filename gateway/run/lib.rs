@@ -22,6 +22,7 @@ pub mod save;
 pub mod service_manager;
 pub mod signals;
 mod start_clock;
+pub mod supervisor;
 pub mod thermal;
 pub mod tick;
 pub mod update;
@@ -38,11 +39,13 @@ use gateway_backup::{BackupPaths, BackupSchedule, take_restored};
 use gateway_base::cannot_run::CannotRun;
 use gateway_base::clock::{self, of_box};
 use gateway_base::log::{self, Notice, Severity};
-use gateway_config::Config;
+use gateway_config::{Config, HttpConfig};
 use gateway_control::{self as control, OrderReceiver};
 use gateway_diagnosis::handle::DiagnosisHandle;
 use gateway_gate::Gate;
-use gateway_http::{Certificate, Configured, Published, Server, ServerParts, ServerState, bind_port, port_trouble};
+use gateway_http::{
+    Certificate, CertificateError, Configured, Published, Server, ServerParts, ServerState, bind_port, port_trouble,
+};
 use gateway_pipeline::Pipeline;
 use gateway_sources::open::{self, MachineSpeed, Sources};
 use gateway_status::alignment;
@@ -56,6 +59,7 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
+use supervisor::Supervisor;
 use thermal::Thermal;
 use tick::{Identity, RunEnd, RunFlags, Ticker};
 use tokio::net::TcpListener;
@@ -78,8 +82,8 @@ pub struct RunPlan {
     pub config: Config,
     /// Its file; `None`: the built-in one.
     pub config_file: Option<PathBuf>,
-    /// Did the user name the port? Then one that is in use is an error; otherwise the box goes on without its page and
-    /// keeps trying.
+    /// Did a person name the port on the command line? Then one that is in use is an error; otherwise the box goes on without its
+    /// page and keeps trying.
     pub port_named: bool,
     /// How fast machine time runs.
     pub speed: MachineSpeed,
@@ -135,7 +139,6 @@ fn run_once(
     let opening = OpeningReport::start();
     let started = ClockStart::judge_clock(plan, follows);
     let outputs = ConfiguredSinks::from_config(&plan.config);
-    let certificate = load_certificate(plan)?;
     let run_flags = Arc::new(RunFlags::default());
     let (report, port) = watch::channel(None);
     let (post, inbox) = control::create_queues();
@@ -149,8 +152,7 @@ fn run_once(
         .name("tick".to_owned())
         .spawn(move || ticker.run())
         .map_err(|error| CannotRun::new(format!("no thread for the tick: {error}"), ""))?;
-    let serving =
-        serve_until_end(plan, (listener, certificate), live, (&run_flags, signals), channels, outputs.as_ref());
+    let serving = serve_until_end(plan, listener, live, (&run_flags, signals), channels, outputs.as_ref());
     runtime.block_on(serving);
     beat.abort();
     thread.join().map_err(|_| CannotRun::new("the tick broke off", "report this with the log; what was stored is safe"))
@@ -189,15 +191,16 @@ fn parse_listen_address(plan: &RunPlan) -> Result<Option<SocketAddr>, CannotRun>
 }
 
 /// What is shown to whoever connects, where the page is served over TLS.
-fn load_certificate(plan: &RunPlan) -> Result<Option<Certificate>, CannotRun> {
-    let http = &plan.config.http;
-    let Some(listen) = parse_listen_address(plan)?.filter(|_| http.tls) else { return Ok(None) };
-    let directory = plan.config.gateway.data_dir.join("tls");
-    let certificate = match &http.certificate {
-        Some((certificate, key)) => Certificate::read(certificate, key),
-        None => Certificate::load_or_create(&directory, listen, &http.allow_hosts),
-    };
-    certificate.map(Some).map_err(|error| CannotRun::new(error.to_string(), "cnc-gateway check says more"))
+fn load_certificate(
+    http: &HttpConfig,
+    listen: SocketAddr,
+    directory: &Path,
+) -> Result<Option<Certificate>, CertificateError> {
+    match &http.certificate {
+        _ if !http.tls => Ok(None),
+        Some((certificate, key)) => Certificate::read(certificate, key).map(Some),
+        None => Certificate::load_or_create(directory, listen, &http.allow_hosts).map(Some),
+    }
 }
 
 /// A port that the user named is opened before anything else starts.
@@ -234,7 +237,7 @@ fn build_ticker(
     let memory = data_dir.join("estimators.json");
     let (mut pipeline, watched) = build_pipeline(plan, &memory, &mut told);
     let beside = twin.as_ref().map(Twin::extra_series).unwrap_or_default();
-    let mut thermal = Thermal::from_config(config)?;
+    let (mut thermal, standing_problems) = thermal::open_law(config, &mut told);
     let of_thermal = thermal.as_ref().map(Thermal::extra_series).unwrap_or_default();
     pipeline.exclude_series(&of_thermal);
     let beside = [pipeline.extra_series(), alignment::list_series(), beside, of_thermal].concat();
@@ -248,7 +251,8 @@ fn build_ticker(
     let Sources { feed, schedule: pace, simulated, ways, machines } =
         opened.map_err(|problems| CannotRun::new(problems.join("\n"), "cnc-gateway check says more"))?;
     let wake = inbox.wake.clone();
-    let commands = way_to_machine::build_commands(plan, ways, inbox, &clock, pipeline.gate_mut())?;
+    let commands =
+        way_to_machine::build_commands(plan, ways, inbox, &clock, pipeline.gate_mut(), history_store.stored_audit())?;
     let identity = Identity {
         machine: config.gateway.name.clone(),
         simulated,
@@ -270,9 +274,7 @@ fn build_ticker(
     health.record_event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
     told.iter().for_each(|notice| health.record_event(start_ns, "gateway", notice));
     started.notices.iter().for_each(|notice| health.record_event(start_ns, "clock", notice));
-    let run_flags = run_flags.clone();
     let operations = config.operations.path.as_deref().map(Operations::start_watching);
-    let wear = Wear::from_config(config);
     Ok((
         Ticker {
             identity,
@@ -283,15 +285,17 @@ fn build_ticker(
             machines,
             operations,
             twin,
-            wear,
+            wear: Wear::from_config(config),
             thermal,
             sinks: outputs.map(|outputs| outputs.board.clone()).unwrap_or_default(),
             scripts: watched,
             health,
-            run_flags,
+            run_flags: run_flags.clone(),
             wake,
             publish,
             stop_after_ns,
+            supervisor: Supervisor::new(),
+            standing_problems,
         },
         live,
     ))
@@ -309,7 +313,7 @@ fn start_ns(plan: &RunPlan, history_store: &HistoryStore, now_ns: TimeNs) -> Tim
 /// Serves until a signal says stop, or the tick has ended by itself.
 async fn serve_until_end(
     plan: &RunPlan,
-    (listener, certificate): (Option<TcpListener>, Option<Certificate>),
+    listener: Option<TcpListener>,
     live: watch::Receiver<Option<Published>>,
     (run_flags, signals): (&Arc<RunFlags>, Option<&mut Signals>),
     (report, post, diagnoses): (watch::Sender<Option<String>>, control::OrderSender, Option<DiagnosisHandle>),
@@ -340,6 +344,9 @@ async fn serve_until_end(
                 diagnoses,
                 configured,
             });
+            let http = plan.config.http.clone();
+            let directory = plan.config.gateway.data_dir.join("tls");
+            let certificate = move || load_certificate(&http, address, &directory);
             Some(Server::start((address, listener), certificate, shared, report))
         }
         _ => None,

@@ -6,6 +6,7 @@
 //! history helps.
 
 use adapters::clock::{SECOND_NS, TimeNs};
+use adapters::threads::receive_work;
 use gateway_base::files::replace_file;
 use gateway_history::{Audit, Reader, Writer};
 use std::collections::VecDeque;
@@ -71,7 +72,7 @@ fn write_rows(path: &Path, rows: &Receiver<Audit>) {
     let mut kept: VecDeque<String> = read_lines(path).into();
     let mut added = ROWS_ADDED;
     let mut file = None;
-    for row in rows {
+    while let Some(row) = receive_work("audit", rows) {
         // None of its fields can fail to be written.
         let line = serde_json::to_string(&row).unwrap_or_default() + "\n";
         kept.push_back(line.clone());

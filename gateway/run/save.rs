@@ -1,5 +1,6 @@
 //! What the box has learned goes to disk beside the tick, so that a slow disk never delays a write to the machine.
 
+use adapters::threads::receive_work;
 use gateway_base::files::replace_file;
 use gateway_base::state_file;
 use std::path::{Path, PathBuf};
@@ -43,7 +44,11 @@ impl Saver {
     #[must_use]
     pub fn start() -> Self {
         let (send, jobs) = sync_channel::<SaveJob>(WAITING_MAX);
-        let work = move || jobs.iter().for_each(|job| job.write_file());
+        let work = move || {
+            while let Some(job) = receive_work("save", &jobs) {
+                job.write_file();
+            }
+        };
         let thread = std::thread::Builder::new().name("save".to_owned()).spawn(work).ok();
         Self { jobs: thread.is_some().then_some(send), thread }
     }

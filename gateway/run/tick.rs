@@ -6,12 +6,14 @@ use super::live_twin::Twin;
 use super::priority::{self, Granted};
 use super::report;
 use super::rules::ScriptWatch;
+use super::supervisor::Supervisor;
 use super::thermal::Thermal;
 use super::wear::{self, Wear};
 use crate::operations::{Operations, SOURCE};
 use adapters::Sample;
 use adapters::clock::TimeNs;
 use adapters::simulated::Simulated;
+use adapters::threads::reach_fault_point;
 use gateway_base::log::{Notice, Severity};
 use gateway_config::GateMode;
 use gateway_control::Wake;
@@ -100,6 +102,10 @@ pub struct Ticker {
     pub publish: watch::Sender<Option<Published>>,
     /// End after so much machine time.
     pub stop_after_ns: Option<i64>,
+    /// Looks after the threads.
+    pub supervisor: Supervisor,
+    /// What could not be begun and will not be, until the box is started again.
+    pub standing_problems: Vec<StatusProblem>,
 }
 
 impl Ticker {
@@ -120,10 +126,14 @@ impl Ticker {
         let mut last_ns = None;
         while let Some(now_ns) = self.next_tick(&sample, last_ns) {
             last_ns = Some(now_ns);
+            reach_fault_point("tick");
             let began_ns = *first_ns.get_or_insert(now_ns);
             let alive = self.feed.sample_into(&mut sample, now_ns);
             self.fill_from_recipe(&mut sample, now_ns);
             self.scripts.apply_changes(&mut self.pipeline, &mut self.health, &self.run_flags, (now_ns, sample.at_ns));
+            if self.disarm_for_broken_threads(&sample) {
+                published = None;
+            }
             self.commands.run_orders(self.pipeline.gate_mut(), &sample, &mut self.health);
             self.wear.supply_models(&mut self.pipeline, sample.at_ns, &mut self.health);
             let inferred = *self.pipeline.infer_estimates(&sample);
@@ -167,6 +177,18 @@ impl Ticker {
         self.health.close(&self.pipeline, sample.at_ns);
         self.run_flags.stop.store(true, Ordering::SeqCst);
         if self.health.follows_clock() { RunEnd::FollowClock } else { RunEnd::Over }
+    }
+
+    /// A thread that broke off ends the arming, before anything is decided or ordered. Gives whether there was one.
+    fn disarm_for_broken_threads(&mut self, sample: &Sample) -> bool {
+        let Some(found) = self.supervisor.look_at_threads() else { return false };
+        let Self { commands, pipeline, health, .. } = self;
+        found.notices.iter().for_each(|notice| health.record_event(sample.at_ns, "gateway", notice));
+        if let Some(thread) = &found.gone {
+            pipeline.gate_mut().forbid_arming(thread);
+        }
+        commands.end_arming(Disarmed::Thread, sample, pipeline.gate_mut(), health);
+        true
     }
 
     /// Waits for the next tick. Orders that come meanwhile are carried out at once: whoever disarms does not wait for it.
@@ -262,6 +284,8 @@ impl Ticker {
             .chain(recipe)
             .chain(self.sinks.list_problems())
             .chain(self.commands.list_problems(self.pipeline.gate()))
+            .chain(self.supervisor.list_problems())
+            .chain(self.standing_problems.iter().cloned())
             .collect()
     }
 }

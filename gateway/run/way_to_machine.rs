@@ -3,6 +3,7 @@
 use super::RunPlan;
 use super::actuator_worker::{ActuatorWorker, Tools};
 use super::command::Commands;
+use super::history_store::StoredAudit;
 use super::offset_commands::OffsetCommands;
 use adapters::clock::Clock;
 use adapters::{Actuator, OffsetSink};
@@ -24,6 +25,7 @@ pub(super) fn build_commands(
     inbox: OrderReceiver,
     clock: &Arc<dyn Clock>,
     gate: &mut Gate,
+    audit: StoredAudit,
 ) -> Result<Commands, CannotRun> {
     let limits: &config::GateConfig = &plan.config.gate;
     let data_dir = &plan.config.gateway.data_dir;
@@ -37,7 +39,7 @@ pub(super) fn build_commands(
             .map(|(shifting, account)| (shifting, Some(account)))?,
         None => (OffsetCommands::without_sink(data_dir), None),
     };
-    let tools = Tools { actuator, offsets };
+    let tools = Tools { audit: Arc::new(audit), actuator, offsets };
     let actuator_worker = match plan.speed {
         MachineSpeed::Real => ActuatorWorker::start(tools, limits, clock.clone(), open::tick_period(&plan.config))
             .map_err(|error| CannotRun::new(format!("no thread to write with: {error}"), ""))?,

@@ -8,8 +8,9 @@ use adapters::merge::{Delay, Lockstep, Merge, SourcePlan};
 use adapters::open::{OpenError, Opened, open_address, open_pull};
 use adapters::simulated::Simulated;
 use adapters::worker::{Worker, WorkerSettings};
-use adapters::{Actuator, Address, OffsetSink, Pull, Source};
-use gateway_config::{self as config, Config};
+use adapters::{Actuator, Address, ChannelId, OffsetSink, Pull, Source};
+use gateway_config::{self as config, Config, GateMode};
+use gateway_gate::EVIDENCE;
 use gateway_status::alignment::{Alignment, Patience};
 use std::sync::Arc;
 use std::time::Duration;
@@ -88,12 +89,13 @@ fn is_simulated(config: &Config) -> bool {
 
 fn open_live_sources(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources, Vec<String>> {
     let (mut found, mut ways, mut problems) = (Vec::new(), Vec::new(), Vec::new());
-    let mut machines = Vec::new();
+    let (mut machines, mut owners) = (Vec::new(), Vec::new());
     for source in &config.sources {
         match open_source(&source.address, clock.now_ns()) {
             Ok(opened) => {
                 let (deadline, period) = (source.deadline, source.period);
                 let settings = WorkerSettings { deadline, period, ..WorkerSettings::default() };
+                owners.extend(opened.sources.iter().map(|_| source.name.as_str()));
                 found.extend(opened.sources.into_iter().map(|driver| (driver, settings)));
                 let (name, actuator, offsets) = (source.name.clone(), opened.actuator, opened.offsets);
                 ways.push(Way { name, actuator, offsets });
@@ -105,7 +107,8 @@ fn open_live_sources(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources,
     if !problems.is_empty() {
         return Err(problems);
     }
-    let feed = start_workers(found, clock, &config.alignment)
+    let written = find_written_source(&config.gate);
+    let feed = start_workers(found, clock, &config.alignment, |plans| reserve_evidence(plans, &owners, written))
         .map_err(|error| vec![format!("no thread for a source: {error}")])?;
     let pace = TickSchedule::on_clock(clock.clone(), tick_period(config));
     Ok(Sources { feed, schedule: pace, ways, machines, simulated: is_simulated(config) })
@@ -119,16 +122,38 @@ pub(crate) fn open_source(address: &Address, now_ns: TimeNs) -> Result<Opened, O
     crate::waveform::open_source(address).unwrap_or_else(|| open_address(address, now_ns))
 }
 
+/// Name of the source that may be written to.
+fn find_written_source(gate: &config::GateConfig) -> Option<&str> {
+    let overrides = gate.source.as_deref().filter(|_| gate.mode == GateMode::Armed);
+    let offsets = gate.offset.source.as_deref().filter(|_| gate.offset.mode == GateMode::Armed);
+    overrides.or(offsets)
+}
+
+/// What the machine that is written to tells of itself comes from that machine alone: no other source, wherever it stands in the list, can
+/// take the place of its mode, its alarm or its switches, and none stands in while it is silent. What it does not tell may come from elsewhere.
+fn reserve_evidence(plans: &mut [SourcePlan], owners: &[&str], written: Option<&str>) {
+    let Some(written) = written else { return };
+    let is_own = |index: usize| owners.get(index) == Some(&written);
+    let own = |plan: &SourcePlan| plan.channels.iter().copied().filter(|id| EVIDENCE.contains(id)).collect::<Vec<_>>();
+    let reserved: Vec<ChannelId> =
+        plans.iter().enumerate().filter(|(index, _)| is_own(*index)).flat_map(|(_, plan)| own(plan)).collect();
+    for (_, plan) in plans.iter_mut().enumerate().filter(|(index, _)| !is_own(*index)) {
+        plan.channels.retain(|id| !reserved.contains(id));
+    }
+}
+
 fn start_workers(
     sources: Vec<(Box<dyn Source>, WorkerSettings)>,
     clock: &Arc<dyn Clock>,
     alignment: &config::AlignmentConfig,
+    reserve: impl FnOnce(&mut [SourcePlan]),
 ) -> std::io::Result<SampleFeed> {
     let plan = |(source, settings): &(Box<dyn Source>, WorkerSettings)| {
         let plan = SourcePlan::from_source(source.as_ref());
         SourcePlan { period: settings.period.unwrap_or(plan.period), ..plan }
     };
-    let plans: Vec<SourcePlan> = sources.iter().map(plan).collect();
+    let mut plans: Vec<SourcePlan> = sources.iter().map(plan).collect();
+    reserve(&mut plans);
     let merge = Merge::new(&plans, Delay::SlowestPeriod);
     let start = |(source, settings)| Worker::start(source, clock.clone(), settings);
     let workers = sources.into_iter().map(start).collect::<Result<_, _>>()?;
@@ -162,4 +187,28 @@ fn open_stepped_sources(config: &Config, speed: MachineSpeed, start_ns: TimeNs) 
 
 fn describe_speed_error(error: &OpenError) -> String {
     format!("{error} (with --speed only simulated machines and recordings can be read)")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_other_source_speaks_for_the_machine_that_is_written_to() {
+        let plan = |name: &str, channels: &[&str]| SourcePlan {
+            name: name.to_owned(),
+            channels: channels.iter().map(|name| ChannelId::from_name(name).expect("in the table")).collect(),
+            period: Duration::from_millis(100),
+        };
+        let all = || {
+            [plan("simulated://lathe", &["mode", "alarm", "spindle_power_w", "dry_run"]), plan("c", &["mode", "alarm"])]
+        };
+        let names = |plan: &SourcePlan| plan.channels.iter().map(|id| id.name()).collect::<Vec<_>>();
+        let mut plans = all();
+        reserve_evidence(&mut plans, &["before", "control"], Some("control"));
+        assert_eq!((names(&plans[0]), names(&plans[1])), (vec!["spindle_power_w", "dry_run"], vec!["mode", "alarm"]));
+        let mut plans = all();
+        reserve_evidence(&mut plans, &["before", "control"], None);
+        assert_eq!(plans, all(), "nothing is written: the first one wins as before");
+    }
 }

@@ -181,7 +181,8 @@ impl<'a> Linearised<'a> {
         loop {
             let solved = least_squares(&columns, &left).coefficients;
             let steps: Vec<f64> = solved.iter().zip(&self.sizes).map(|(step, size)| step / size).collect();
-            let Some(index) = (0..self.free.len()).find(|index| !resting[*index] && self.leaves_range(*index, steps[*index]))
+            let Some(index) =
+                (0..self.free.len()).find(|index| !resting[*index] && self.leaves_range(*index, steps[*index]))
             else {
                 return steps;
             };

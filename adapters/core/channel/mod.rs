@@ -306,9 +306,12 @@ const FIRST: &[Channel] = &[
 /// The name of the table nearest to `name`, for "did you mean".
 #[must_use]
 pub fn find_nearest_name<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let limit = (name.len() / 3).max(2);
+    let length = name.chars().count();
+    let limit = (length / 3).max(2);
+    // A name whose length differs by more cannot be near; of a text of a megabyte nothing else would be told in less than minutes.
     names
         .into_iter()
+        .filter(|known| known.chars().count().abs_diff(length) <= limit)
         .map(|known| (strsim::levenshtein(name, known), known))
         .min()
         .filter(|(d, _)| *d <= limit)
@@ -333,5 +336,9 @@ mod tests {
     fn a_misspelt_name_finds_its_neighbour() {
         let names = CHANNELS.iter().map(|channel| channel.name);
         assert_eq!(find_nearest_name("spindel_speed_rpm", names), Some("spindle_speed_rpm"));
+        let names = CHANNELS.iter().map(|channel| channel.name);
+        let began = std::time::Instant::now();
+        assert_eq!(find_nearest_name(&"x".repeat(1 << 20), names), None);
+        assert!(began.elapsed() < std::time::Duration::from_secs(1), "a text of a megabyte is near to no name at once");
     }
 }

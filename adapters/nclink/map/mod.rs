@@ -294,10 +294,7 @@ impl PolledItem {
 
     fn build_number_reading(&self, answer: &Option<NcLinkAnswer>, stamp: Stamp) -> Reading {
         if let Some(own) = &self.own {
-            return own.to_reading(
-                stamp,
-                own.item.extract_value(&own.channel, answer.as_ref(), &self.conversion),
-            );
+            return own.to_reading(stamp, own.item.extract_value(&own.channel, answer.as_ref(), &self.conversion));
         }
         match self.find_value(answer).and_then(|value| self.conversion.convert_value(value)) {
             Ok(number) => Reading::from_number(self.channel, stamp, number),

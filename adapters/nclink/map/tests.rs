@@ -174,7 +174,9 @@ fn texts_with_their_unit_and_tools_with_their_letter_are_read() {
     let model = model_of("FEED_OVERRIDE", "%");
     let plan = NcLinkPoll::from_model(&model, LAYOUT, &[], false);
     assert_eq!(of(&answered(&plan, &[("it", json!("85%"))]), "feed_override_pct"), Ok(Held::Number(85.0)));
-    for (said, tool) in [(json!("T07"), Some("T7")), (json!("t7"), Some("T7")), (json!("07"), Some("T7")), (json!("TX"), None)] {
+    for (said, tool) in
+        [(json!("T07"), Some("T7")), (json!("t7"), Some("T7")), (json!("07"), Some("T7")), (json!("TX"), None)]
+    {
         assert_eq!(format_tool(&said).as_deref(), tool, "{said}");
     }
     assert_eq!(format_line(&json!("N0120")).as_deref(), Some("N120"));

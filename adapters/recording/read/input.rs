@@ -22,6 +22,15 @@ enum InputPlace {
 pub(super) trait Seekable: Read + Seek {}
 impl<T: Read + Seek> Seekable for T {}
 
+/// A pipe or a device has no end, or never begins.
+fn open_regular_file(path: &Path) -> std::io::Result<File> {
+    let kind = std::fs::metadata(path)?;
+    if !kind.is_file() {
+        return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "it is no regular file"));
+    }
+    File::open(path)
+}
+
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
 impl Input {
@@ -42,7 +51,7 @@ impl Input {
         Ok(match &self.place {
             InputPlace::Path(path) => Box::new(BufReader::with_capacity(
                 1 << 16,
-                File::open(path).map_err(|error| self.build_io_error(error))?,
+                open_regular_file(path).map_err(|error| self.build_io_error(error))?,
             )),
             InputPlace::Memory(bytes) => Box::new(Cursor::new(bytes.as_slice())),
         })

@@ -2,6 +2,8 @@
 //! package keeps in a file of its own; without them the report holds addresses, which that file translates.
 
 use crate::files::keep_last;
+use adapter_core::text::shorten_text;
+use adapter_core::threads::record_panic;
 use std::backtrace::Backtrace;
 use std::fs;
 use std::panic::PanicHookInfo;
@@ -15,15 +17,28 @@ const FOLDER: &str = "crashes";
 /// What the names of reports begin with; what else lies there stays.
 const REPORT: &str = "crash-";
 
-/// From now on a panic of any thread writes a report into this data directory, besides what is printed.
+/// From now on a panic of any thread is known to whoever looks after the threads, and writes a report into this data directory, besides
+/// what is printed.
 pub fn keep_crash_reports(data_dir: &Path) {
     let folder = data_dir.join(FOLDER);
     let before = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
         before(info);
+        record_panic(&thread_name(), &describe_place(info));
         // There is nobody left to tell when not even this can be written.
         let _not_written = write_report(&folder, info);
     }));
+}
+
+fn thread_name() -> String {
+    std::thread::current().name().unwrap_or("without a name").to_owned()
+}
+
+/// What and where, in one line.
+fn describe_place(info: &PanicHookInfo<'_>) -> String {
+    let said = info.payload_as_str().unwrap_or("a panic");
+    let place = info.location().map_or(String::new(), |place| format!("{}:{}: ", place.file(), place.line()));
+    shorten_text(format!("{place}{said}"))
 }
 
 fn write_report(folder: &Path, info: &PanicHookInfo<'_>) -> std::io::Result<()> {
@@ -32,7 +47,7 @@ fn write_report(folder: &Path, info: &PanicHookInfo<'_>) -> std::io::Result<()> 
     let _full = remove_oldest(folder);
     // Not the box's clock: whoever breaks off may hold its lock.
     let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    let thread = std::thread::current().name().unwrap_or("without a name").to_owned();
+    let thread = thread_name();
     let text = format!(
         "cnc-gateway {}\nseconds since 1970: {}\nthread: {thread}\n{info}\n\n{}\n",
         env!("CARGO_PKG_VERSION"),

@@ -10,7 +10,10 @@
 //! of what was written: the time of that is the step's reaction time. What is anything else when the machine has had its time
 //! to settle ends the arming.
 
+mod record;
 mod withdraw;
+
+pub use record::{Occasion, Reaction, WriteRecord};
 
 use super::fault::{Fault, UnexpectedReading};
 use super::verdict::{GateOutcome, Verdict};
@@ -20,70 +23,26 @@ use adapter_core::units::OverridePct;
 use adapter_core::{Actuator, LadderRequest, LadderRule, SourceError};
 use gateway_base::convert::saturate_to_ns as ns;
 use std::collections::VecDeque;
+use std::sync::Arc;
 use withdraw::Owed;
-
-/// Why the writer wrote.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Occasion {
-    /// Another override than before.
-    Change,
-    /// The same override again, so that the ladder keeps it.
-    SignOfLife,
-    /// The machine is given back to its dial.
-    Release,
-    /// What an earlier run had left enabled is withdrawn.
-    Leftover,
-}
-
-impl Occasion {
-    /// In the words of the history.
-    #[must_use]
-    pub fn as_words(self) -> &'static str {
-        match self {
-            Self::Change => "the override was changed",
-            Self::SignOfLife => "the sign of life",
-            Self::Release => "the machine was given back to its dial",
-            Self::Leftover => "an override that an earlier run had left enabled was withdrawn",
-        }
-    }
-}
-
-/// One write, for the history.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WriteRecord {
-    /// When it was issued.
-    pub at_ns: TimeNs,
-    /// The sample that led to it.
-    pub sample_ns: TimeNs,
-    /// What made the writer write.
-    pub occasion: Occasion,
-    /// The override in force before, as read, where it could be read.
-    pub before: Option<OverridePct>,
-    /// The override that was written.
-    pub asked: OverridePct,
-    /// What was read back right after, where it could be read; a ladder needs a few scans.
-    pub after: Option<OverridePct>,
-    /// What went wrong; `None`: nothing did.
-    pub fault: Option<Fault>,
-}
-
-/// A step of the override that the machine has been seen to take.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Reaction {
-    /// The override that was written.
-    pub asked: OverridePct,
-    /// What is in force.
-    pub found: OverridePct,
-    /// The sample that led to it.
-    pub sample_ns: TimeNs,
-    /// When it was written.
-    pub issued_ns: TimeNs,
-    /// When it was seen to be in force.
-    pub seen_ns: TimeNs,
-}
 
 /// A ladder waits for at least so many signs of life (`heartbeat_s` is at most a third of its patience).
 const HEARTBEATS_PATIENCE: i64 = 3;
+
+/// Where every write is accounted for. Something is written to the machine only while this is there.
+pub trait AuditPath: Send + Sync {
+    /// Is what is written now stored? Asked before each write, by the thread that writes.
+    fn is_live(&self) -> bool;
+}
+
+impl AuditPath for Arc<dyn AuditPath> {
+    fn is_live(&self) -> bool {
+        (**self).is_live()
+    }
+}
+
+/// The audit was there a moment ago: what a write needs. Made by [`OverrideWriter::ask_audit`] only.
+struct LiveAudit(());
 
 /// How the writer keeps its pace, from `[gate]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,6 +64,7 @@ struct PendingWrite {
 /// Holds the only actuator there is. Blocks as long as the machine takes to answer, so it belongs on its own thread.
 pub struct OverrideWriter<A> {
     actuator: A,
+    audit: Box<dyn AuditPath>,
     schedule: WriteSchedule,
     settle_ns: i64,
     /// What was written while the machine settles, the newest at the end; before the first write, what was in force.
@@ -125,11 +85,12 @@ pub struct OverrideWriter<A> {
 
 impl<A: Actuator> OverrideWriter<A> {
     /// Nothing is written until a verdict says so, but what an earlier run has left enabled is withdrawn.
-    pub fn new(actuator: A, limits: &GateConfig) -> Self {
+    pub fn new(actuator: A, audit: Box<dyn AuditPath>, limits: &GateConfig) -> Self {
         let rule = if limits.above_dial { LadderRule::Product } else { LadderRule::Least };
         let settle_ns = ns(actuator.settles_within()).max(SECOND_NS / 100);
         Self {
             actuator,
+            audit,
             schedule: WriteSchedule { interval_ns: ns(limits.min_interval), heartbeat_ns: ns(limits.heartbeat), rule },
             settle_ns,
             recent: VecDeque::new(),
@@ -151,12 +112,14 @@ impl<A: Actuator> OverrideWriter<A> {
 
     /// Writes what an armed verdict asks for, when it has changed or the sign of life is due. The first verdict that is not
     /// armed any more, or asks for nothing, gives the machine back to its dial. Anything else writes nothing; neither does an
-    /// armed verdict after a fault, until one that is not armed has been seen.
+    /// armed verdict after a fault, until one that is not armed has been seen. Without a live audit every verdict counts as one that is
+    /// not armed.
     pub fn write_verdict(&mut self, verdict: &Verdict, clock: &dyn Clock) -> Option<WriteRecord> {
-        if !verdict.armed {
-            self.failed = false;
+        let audit = self.ask_audit().filter(|_| verdict.armed);
+        let Some(audit) = audit else {
+            self.failed &= verdict.armed;
             return self.release_machine(clock);
-        }
+        };
         if self.failed {
             return None;
         }
@@ -177,8 +140,14 @@ impl<A: Actuator> OverrideWriter<A> {
         match (begins, self.find_interruption(at_ns, clock)) {
             (Ok(false), _) => None,
             (Err(fault), _) | (Ok(true), Some(fault)) => self.track_failure(|_| Some(failed(fault))),
-            (Ok(true), None) => self.track_failure(|it| it.write(occasion, verdict.permitted, verdict.at_ns, clock)),
+            (Ok(true), None) => {
+                self.track_failure(|it| it.write((occasion, audit), verdict.permitted, verdict.at_ns, clock))
+            }
         }
+    }
+
+    fn ask_audit(&self) -> Option<LiveAudit> {
+        self.audit.is_live().then_some(LiveAudit(()))
     }
 
     /// Nothing more is written after a fault.
@@ -257,6 +226,12 @@ impl<A: Actuator> OverrideWriter<A> {
     /// # Errors
     /// What the driver says.
     pub fn send_request(&mut self, request: LadderRequest, clock: &dyn Clock) -> Result<(), SourceError> {
+        self.ask_audit().ok_or_else(|| SourceError::Refused {
+            source_name: self.actuator.name().to_owned(),
+            request: request.as_word().to_owned(),
+            what: "it was not sent: the history takes nothing, so it could not be accounted for".to_owned(),
+            next: "`cnc-gateway history info` says more".to_owned(),
+        })?;
         self.actuator.ask_ladder(clock, request)
     }
 
@@ -314,7 +289,7 @@ impl<A: Actuator> OverrideWriter<A> {
     /// A machine that is switched off is written nothing, which is no fault.
     fn write(
         &mut self,
-        occasion: Occasion,
+        (occasion, _audit): (Occasion, LiveAudit),
         wanted: OverridePct,
         sample_ns: TimeNs,
         clock: &dyn Clock,

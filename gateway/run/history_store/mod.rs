@@ -8,14 +8,16 @@ use adapters::clock::TimeNs;
 use gateway_base::clock::{ClockMark, Trust};
 use gateway_base::log::{Notice, Severity};
 use gateway_config as config;
+use gateway_gate::AuditPath;
 use gateway_history::{
     self as history, AlarmClear, Audit, DiskRoom, ExtraSeries, HistoryError, Options, Outbox, Reader, Record,
-    RecordSpan, Retention, Writer, disk_room,
+    RecordSpan, Retention, Writer, WriterLife, disk_room,
 };
 use gateway_pipeline::Store;
 use gateway_status::HistoryStatus;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Pause between two tries to open a history that cannot be opened.
@@ -31,10 +33,32 @@ const RATE_AFTER_S: f64 = 600.0;
 const SHORT: &str = "The disk is all but full: each new sample takes the place of the oldest raw one. Free some room on the disk \
                      of the history.";
 
+/// Said when the thread that writes is gone.
+const BROKE_OFF: &str =
+    "nothing is being stored: the thread that writes the history broke off; it is begun anew within ten seconds";
+
+/// Is what is written now stored? Follows the history through every opening of its file.
+#[derive(Debug, Clone, Default)]
+pub struct StoredAudit(Arc<Mutex<Option<WriterLife>>>);
+
+impl StoredAudit {
+    fn follow_writer(&self, writer: &Writer) {
+        // It is complete whenever the lock is free.
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(writer.life());
+    }
+}
+
+impl AuditPath for StoredAudit {
+    fn is_live(&self) -> bool {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).as_ref().is_some_and(WriterLife::is_live)
+    }
+}
+
 /// The history, open or not.
 #[derive(Debug)]
 pub struct HistoryStore {
     path: PathBuf,
+    audit: StoredAudit,
     options: Options,
     writer: Option<Writer>,
     /// The newest rows of the audit, for a start after a kill.
@@ -79,6 +103,7 @@ impl HistoryStore {
     ) -> Result<Self, HistoryError> {
         let mut history_store = Self {
             path: config.path.clone(),
+            audit: StoredAudit::default(),
             options: Options { clock, ..build_options(config, beside, outbox) },
             writer: None,
             recent: None,
@@ -119,6 +144,7 @@ impl HistoryStore {
         self.rows_before = rows_in(&self.path);
         end_alarms(&self.path, &writer);
         self.bytes_before = file_size_bytes(&self.path);
+        self.audit.follow_writer(&writer);
         self.writer = Some(writer);
         self.closed = None;
         Ok(())
@@ -157,6 +183,7 @@ impl HistoryStore {
                 Err(error) => self.opening_failed(&error),
             }
         }
+        self.look_at_thread();
         self.look_at_file();
         self.look_at_damage();
         self.look_at_log();
@@ -174,7 +201,26 @@ impl HistoryStore {
     /// Does it take what is handed in, and make it durable?
     #[must_use]
     pub fn is_storing(&self) -> bool {
-        self.writer.as_ref().is_some_and(|writer| writer.status().degraded.is_none())
+        self.writer.as_ref().is_some_and(|writer| writer.life().is_live())
+    }
+
+    /// For the thread that writes to the machine: is what is written now stored?
+    #[must_use]
+    pub fn stored_audit(&self) -> StoredAudit {
+        self.audit.clone()
+    }
+
+    /// A thread that broke off writes nothing any more: the file is opened anew, by another thread.
+    fn look_at_thread(&mut self) {
+        let Some(writer) = self.writer.take_if(|writer| writer.is_stopped()) else { return };
+        self.recent = None;
+        let status = writer.close();
+        self.lost += status.dropped_samples + self.handed.saturating_sub(status.rows);
+        self.rows_before += status.rows;
+        let text =
+            format!("{BROKE_OFF}; {} samples since its last commit are lost", self.handed.saturating_sub(status.rows));
+        Notice::new(Severity::Error, "history_broke_off", text).write_to_logs();
+        self.closed = Some((BROKE_OFF.to_owned(), Instant::now() + RETRY));
     }
 
     /// Rounds of the thread that writes; `None` where the history is not open.
@@ -237,10 +283,15 @@ impl HistoryStore {
             bytes: writer.bytes,
             lasts_days: self.lasts_days(writer.bytes),
             lost: self.lost + writer.dropped_samples + writer.lost_samples,
-            error: closed.or_else(|| describe_trouble(&writer)),
+            error: closed.or_else(|| self.describe_end()).or_else(|| describe_trouble(&writer)),
             log_bytes: writer.log_bytes,
             set_aside: self.set_aside.clone(),
         }
+    }
+
+    /// The thread is gone, and nobody has noticed yet.
+    fn describe_end(&self) -> Option<String> {
+        self.writer.as_ref().filter(|writer| writer.is_stopped()).map(|_| BROKE_OFF.to_owned())
     }
 
     /// Until the limit or the disk is full at the rate since the start.

@@ -16,7 +16,7 @@ use gateway_base::log::{Notice, Severity};
 use gateway_base::state_file;
 use gateway_config::{self as config, Config};
 use gateway_history::{ExtraSeries, ExtraValue};
-use gateway_status::AlarmStatus;
+use gateway_status::{AlarmStatus, StatusProblem};
 use outside::OutsideWatch;
 use rules::estimators::thermal::{
     AxisSituation, Compensator, Corrected, FollowSettings, HoldReason, SensorModel, SensorWatch, ThermalFollower,
@@ -60,6 +60,23 @@ pub struct Thermal {
     values: [ExtraValue<'static>; COUNT],
     reason: Arc<str>,
     script: Arc<str>,
+}
+
+/// The law of the configuration; one that cannot be read predicts nothing, which is told and stands as a problem. Polling, history and gate do
+/// not need it.
+pub fn open_law(config: &Config, told: &mut Vec<Notice>) -> (Option<Thermal>, Vec<StatusProblem>) {
+    let refused = match Thermal::from_config(config) {
+        Ok(thermal) => return (thermal, Vec::new()),
+        Err(refused) => refused,
+    };
+    let problem = StatusProblem {
+        what: format!("no thermal error is predicted and no offset proposed from it: {}", refused.what),
+        next: format!("{}; then start the box again", refused.next),
+    };
+    told.push(
+        Notice::new(Severity::Error, "thermal_law_refused", problem.what.clone()).with_detail(problem.next.as_str()),
+    );
+    (None, vec![problem])
 }
 
 impl Thermal {

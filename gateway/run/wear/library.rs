@@ -1,5 +1,6 @@
 //! The models of the library, read on a thread of its own whenever a newer one was stored.
 
+use adapters::threads::receive_work_within;
 use gateway_base::log::{Notice, Severity};
 use gateway_history::{HistoryError, Reader};
 use rules::estimators::wear::WearRecord;
@@ -88,7 +89,7 @@ fn look_again(history: &Path, send: &SyncSender<WearRecords>, ended: &Receiver<(
         {
             return;
         }
-        match ended.recv_timeout(LOOK_EVERY) {
+        match receive_work_within("wear", ended, LOOK_EVERY) {
             Err(std::sync::mpsc::RecvTimeoutError::Timeout) => {}
             _ => return,
         }

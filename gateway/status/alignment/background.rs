@@ -1,6 +1,7 @@
 //! The thread that estimates: one estimate at a time, started with the first one.
 
 use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::threads::receive_work;
 use rules::estimators::alignment::{Lag, LagSettings, NotIdentifiable, Transient, estimate_lag};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 
@@ -75,7 +76,7 @@ fn spawn_thread() -> Option<BackgroundThread> {
     let (ask, asked) = sync_channel::<Vec<Transient>>(1);
     let (answer, answers) = sync_channel(1);
     let estimate = move || {
-        while let Ok(transients) = asked.recv() {
+        while let Some(transients) = receive_work("align", &asked) {
             if answer.send(estimate_lag(&transients, &LagSettings::default())).is_err() {
                 return;
             }

@@ -103,15 +103,14 @@ impl Inference {
         self.take_to_reference_voltage(&mut inputs);
         let filtered_w = inputs.power.ok().and_then(|power| self.state.signals.push_power(power, &self.settings));
         let mut no_load = self.select_no_load_reference(&inputs);
-        let tick =
-            Tick {
-                inputs: &inputs,
-                signals: &self.state.signals,
-                settings: &self.settings,
-                filtered_w,
-                standby_w: self.state.standby_w,
-                no_load,
-            };
+        let tick = Tick {
+            inputs: &inputs,
+            signals: &self.state.signals,
+            settings: &self.settings,
+            filtered_w,
+            standby_w: self.state.standby_w,
+            no_load,
+        };
         let feed = self.state.signals.classify_feed(&inputs, &self.settings);
         let verdict = self.state.detector.update_state(&tick);
         if let Some(power_w) = verdict.settled_at_w {

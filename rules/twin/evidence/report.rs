@@ -5,18 +5,18 @@
 //! textbook law bears out is taken back.
 
 use super::answer::{EvidenceAnswer, sum_contributions};
+use super::contributions::project_out_baseline;
 use super::gram::Comparison;
 use super::inputs::RecordingInputs;
 use super::noise::NoiseModel;
-use super::contributions::project_out_baseline;
 use super::textbook::Textbook;
 use super::thresholds::THRESHOLDS;
 use super::written_model::WrittenModel;
+use crate::departure::Departure;
 use crate::diagnosis::{
     Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, UNKNOWN, Verdict,
     find_output_unit,
 };
-use crate::departure::Departure;
 use crate::fit::Fit;
 use crate::inputs::mark_rows_with_inputs;
 use crate::intervals::FittedRows;

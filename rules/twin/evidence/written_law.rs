@@ -72,7 +72,8 @@ impl EvidenceReport<'_, '_> {
                 let mut parts = fewer.parts;
                 parts.insert(first + gone, near[gone].1.clone());
                 let again = self.refit_parts(&parts);
-                best = again.filter(|again| self.sum_left_squares(again) < self.sum_left_squares(&best)).unwrap_or(best);
+                best =
+                    again.filter(|again| self.sum_left_squares(again) < self.sum_left_squares(&best)).unwrap_or(best);
             }
         }
         best
@@ -162,9 +163,16 @@ impl EvidenceReport<'_, '_> {
             let x: Vec<f64> =
                 KNOTS.iter().filter_map(|share| quantile(rows.iter().map(|row| values[*row]), *share)).collect();
             let (low, high) = (*x.first()?, *x.last()?);
-            let rises = x.windows(2).all(|pair| pair[1] - pair[0] > 0.02 * (high - low)) && high - low > 1e-6 * high.abs();
+            let rises =
+                x.windows(2).all(|pair| pair[1] - pair[0] > 0.02 * (high - low)) && high - low > 1e-6 * high.abs();
             // Two levels have no middle.
-            let x = if rises { x } else if high - low > 1e-6 * high.abs() { vec![low, 0.5 * (low + high), high] } else { return None };
+            let x = if rises {
+                x
+            } else if high - low > 1e-6 * high.abs() {
+                vec![low, 0.5 * (low + high), high]
+            } else {
+                return None;
+            };
             Some(Departure { over, x })
         };
         over.filter_map(build).collect()

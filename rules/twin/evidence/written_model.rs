@@ -47,7 +47,9 @@ impl EvidenceReport<'_, '_> {
     /// What each name with a law adds in the file.
     pub(super) fn list_written_contributions(&self, textbook: &Textbook, written: &WrittenModel) -> Vec<Named> {
         let named = self.answer.names.iter().zip(&textbook.laws);
-        named.filter_map(|(name, law)| Some((name.clone(), written.contributions.get(law.as_ref()?.0)?.clone()))).collect()
+        named
+            .filter_map(|(name, law)| Some((name.clone(), written.contributions.get(law.as_ref()?.0)?.clone())))
+            .collect()
     }
 
     /// What the law of a name is worth: the others refitted without it.

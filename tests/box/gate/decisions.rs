@@ -1,6 +1,6 @@
 //! The gate: nothing is written that should not be, whatever a script asks for.
 
-use super::cut::{Random, TICK_NS, asking, cases, cutting, id, limits, set_number, set_text};
+use super::cut::{Random, TICK_NS, asking, cases, cutting, id, limits, set_number, set_text, stored};
 use adapters::clock::{Clock, ManualClock, SECOND_NS};
 use adapters::simulated::{Simulated, SimulatedSettings};
 use adapters::units::OverridePct;
@@ -52,7 +52,7 @@ impl Actuator for Machine {
 }
 
 fn writer<A: Actuator>(actuator: A) -> OverrideWriter<A> {
-    OverrideWriter::new(actuator, &limits(GateMode::Armed))
+    OverrideWriter::new(actuator, stored(), &limits(GateMode::Armed))
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Armed and idle: the operator's dial counts, whatever the ladder makes of an override; and what is enabled is withdrawn when
 //! the gateway stops, is killed, or the control refuses writes.
 
-use super::cut::{TICK_NS, asking, cutting, limits, set_number};
+use super::cut::{TICK_NS, asking, cutting, limits, set_number, stored};
 use adapters::address::SimulatedMachine;
 use adapters::clock::{Clock, ManualClock, SECOND_NS, SystemClock};
 use adapters::fanuc::item::Area;
@@ -41,7 +41,8 @@ impl Stand {
         let armed_for = Duration::from_secs(86_400);
         let mut gate = Gate::new(config::GateConfig { above_dial, armed_for, ..limits(GateMode::Armed) });
         gate.arm("fitter", None, 0).expect("allowed");
-        let writer = OverrideWriter::new(Box::new(machine.feed_override()) as Box<dyn Actuator>, gate.limits());
+        let writer =
+            OverrideWriter::new(Box::new(machine.feed_override()) as Box<dyn Actuator>, stored(), gate.limits());
         Self { machine, gate, writer, clock: ManualClock::with_time(0), tick: 0 }
     }
 
@@ -112,8 +113,11 @@ fn a_ladder_that_replaces_the_dial_where_a_product_is_configured_is_found_out() 
     let mut stand = Stand::new(LadderRule::Replace);
     stand.gate = Gate::new(config::GateConfig { above_dial: true, ..limits(GateMode::Armed) });
     stand.gate.arm("fitter", None, 0).expect("allowed");
-    stand.writer =
-        OverrideWriter::new(Box::new(stand.machine.feed_override()) as Box<dyn Actuator>, stand.gate.limits());
+    stand.writer = OverrideWriter::new(
+        Box::new(stand.machine.feed_override()) as Box<dyn Actuator>,
+        stored(),
+        stand.gate.limits(),
+    );
     stand.turn(70);
     let told = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| stand.ticks(5.0, Some(80.0))));
     let told = told.expect_err("a fault").downcast_ref::<String>().cloned().unwrap_or_default();

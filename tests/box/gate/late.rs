@@ -1,7 +1,7 @@
 //! What nobody expects of a script, a person, a clock or a controller: the arming ends, or the controller takes its time, while
 //! something is on its way to the machine.
 
-use super::cut::{TICK_NS, asking, cutting, limits};
+use super::cut::{TICK_NS, asking, cutting, limits, stored};
 use adapters::clock::{Clock, ManualClock, SECOND_NS, SystemClock};
 use adapters::units::OverridePct;
 use adapters::{Actuator, Axis, LadderRequest, OffsetSink, SourceError};
@@ -102,7 +102,7 @@ fn verdict(pct: u8, armed: bool) -> Verdict {
 fn actuator_worker(controller: &Controller, directory: &tempfile::TempDir) -> ActuatorWorker {
     let book = OffsetJournal::open(directory.path(), "test").expect("readable");
     let offsets = Some(OffsetAccount::new(Box::new(controller.clone()), book));
-    let tools = Tools { actuator: Some(Box::new(controller.clone())), offsets };
+    let tools = Tools { audit: stored().into(), actuator: Some(Box::new(controller.clone())), offsets };
     ActuatorWorker::start(tools, &limits(GateMode::Armed), Arc::new(SystemClock::new()), Duration::from_millis(100))
         .expect("a thread")
 }
@@ -161,7 +161,7 @@ fn whoever_arms_finds_the_machine_at_its_dial_and_never_with_a_leap() {
 #[test]
 fn after_a_fault_nothing_is_written_until_the_gate_has_let_go() {
     let (controller, clock) = (Controller::default(), ManualClock::with_time(0));
-    let mut writer = OverrideWriter::new(controller.clone(), &limits(GateMode::Armed));
+    let mut writer = OverrideWriter::new(controller.clone(), stored(), &limits(GateMode::Armed));
     writer.write_verdict(&verdict(90, true), &clock);
     controller.set(|state| state.shown = Some(37));
     clock.set_time(SECOND_NS / 2);
@@ -176,7 +176,7 @@ fn after_a_fault_nothing_is_written_until_the_gate_has_let_go() {
 #[test]
 fn a_ladder_that_has_taken_the_dial_back_is_not_written_over() {
     let (controller, clock) = (Controller::default(), ManualClock::with_time(0));
-    let mut writer = OverrideWriter::new(controller.clone(), &limits(GateMode::Armed));
+    let mut writer = OverrideWriter::new(controller.clone(), stored(), &limits(GateMode::Armed));
     writer.write_verdict(&verdict(60, true), &clock);
     controller.set(|state| state.shown = Some(100));
     clock.set_time(2 * SECOND_NS);
@@ -184,7 +184,7 @@ fn a_ladder_that_has_taken_the_dial_back_is_not_written_over() {
     assert_eq!(written.fault, Some(Fault::Late { silent_ms: 2000 }));
     assert_eq!(controller.log(), ["60"], "a leap from 100 to 60 % is not made");
     // The signs of life were late and the ladder has not minded.
-    let mut writer = OverrideWriter::new(Controller::default(), &limits(GateMode::Armed));
+    let mut writer = OverrideWriter::new(Controller::default(), stored(), &limits(GateMode::Armed));
     clock.set_time(0);
     writer.write_verdict(&verdict(60, true), &clock);
     clock.set_time(2 * SECOND_NS);
@@ -254,7 +254,7 @@ fn every_write_says_which_script_of_which_version_asked_for_it_and_why() {
     let mut gate = Gate::new(limits(GateMode::Armed));
     gate.arm("fitter", None, 0).expect("allowed");
     let (clock, mut trail) = (ManualClock::with_time(0), audit::Trail::default());
-    let mut writer = OverrideWriter::new(Controller::default(), gate.limits());
+    let mut writer = OverrideWriter::new(Controller::default(), stored(), gate.limits());
     let mut rows = Vec::new();
     for tick in 0..20 {
         clock.set_time(tick * TICK_NS);

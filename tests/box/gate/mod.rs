@@ -12,4 +12,5 @@ mod offsets;
 mod outputs;
 mod running;
 mod shifting;
+mod threads;
 mod unread;

@@ -1,6 +1,6 @@
 //! Whatever a script gives, what reaches the controller is inside the band and moves no faster than the slew limit allows.
 
-use super::cut::{Random, TICK_NS, cases, cutting, limits, set_number};
+use super::cut::{Random, TICK_NS, cases, cutting, limits, set_number, stored};
 use adapters::clock::{Clock, ManualClock, SECOND_NS, TimeNs};
 use adapters::units::OverridePct;
 use adapters::{Actuator, SourceError};
@@ -83,7 +83,7 @@ fn run(count: u64) -> (Vec<(TimeNs, u8)>, [u64; 3]) {
         ..limits(GateMode::Armed)
     });
     gate.arm("fitter", Some(std::time::Duration::from_secs(86_400 * 300)), 0).expect("allowed");
-    let mut writer = OverrideWriter::new(Controller { writes: Vec::new() }, gate.limits());
+    let mut writer = OverrideWriter::new(Controller { writes: Vec::new() }, stored(), gate.limits());
     let (mut host, clock, cases) = (host(), ManualClock::with_time(0), cases());
     let (mut at_ns, mut told) = (0, [0_u64; 3]);
     for _ in 0..count {

@@ -16,6 +16,15 @@ use std::path::Path;
 use std::sync::Arc;
 use tempfile::TempDir;
 
+/// An audit that takes everything.
+struct Stored;
+
+impl gateway::gate::AuditPath for Stored {
+    fn is_live(&self) -> bool {
+        true
+    }
+}
+
 pub(crate) const TICK_NS: i64 = SECOND_NS / 10;
 /// The machine is looked at this often.
 const LOOK_NS: i64 = SECOND_NS / 50;
@@ -134,7 +143,7 @@ impl Bench {
             lockstep: Lockstep::new(sources, Delay::SlowestPeriod),
             pipeline: Pipeline::new(estimators, host, Gate::new(limits.clone())),
             actuator_worker: ActuatorWorker::with_inline_writers(
-                Tools { actuator: Some(actuator), offsets: Some(offsets) },
+                Tools { audit: Arc::new(Stored), actuator: Some(actuator), offsets: Some(offsets) },
                 limits,
             ),
             _directory: directory,

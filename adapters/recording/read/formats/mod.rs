@@ -5,6 +5,7 @@ mod bytes;
 mod labview;
 mod matlab;
 mod mtconnect;
+mod opendocument;
 mod parquet;
 mod refused;
 mod shdr;

@@ -5,9 +5,11 @@ use super::super::input::Input;
 use super::super::limits::{CELLS_IN_MEMORY_MAX, COLUMNS_MAX, UNPACKED_BYTES_MAX};
 use super::super::plan::{Note, NoteKind};
 use super::super::table::{MemoryTable, OwnedCell};
+use super::opendocument;
 use adapter_core::bilingual::Bilingual;
 use adapter_core::clock::{SECOND_NS, TimeNs};
-use calamine::{Data, ExcelDateTime, Range, Reader, Sheets};
+use calamine::{Data, ExcelDateTime, Reader, Sheets, Xlsx};
+use std::collections::BTreeMap;
 use std::io::{Cursor, Read};
 
 /// Days from 1899-12-30 to 1970-01-01.
@@ -26,7 +28,130 @@ pub(super) fn open(input: &Input, sheet: Option<&str>) -> Result<MemoryTable, Re
         calamine::open_workbook_auto_from_rs(Cursor::new(bytes)).map_err(|error| build_broken_error(input, &error))?;
     let names = book.sheet_names();
     let chosen = choose_sheet(&mut book, &names, sheet, input)?;
-    let range = book.worksheet_range(&chosen).map_err(|error| build_broken_error(input, &error))?;
+    let mut table = read_sheet(&mut book, &chosen, input)?;
+    if names.len() > 1 {
+        table.form.push(Bilingual::new(
+            format!("sheet {chosen} of {}", names.len()),
+            format!("{}个工作表中的{chosen}", names.len()),
+        ));
+    }
+    Ok(table)
+}
+
+/// The cells of a sheet. The newer formats are read cell by cell, so that a stray cell far away costs nothing; the library makes a block of
+/// the older ones, whose sheets are small.
+fn read_sheet(book: &mut Book, chosen: &str, input: &Input) -> Result<MemoryTable, RecordingError> {
+    let (mut sheet, mut notes) = (SparseSheet::default(), Vec::new());
+    let broken = |error: &dyn std::fmt::Display| build_broken_error(input, error);
+    match book {
+        Sheets::Xlsx(book) => {
+            let mut cells = book.worksheet_cells_reader(chosen).map_err(|error| broken(&error))?;
+            while let Some(cell) = cells.next_cell().map_err(|error| broken(&error))? {
+                sheet.put_cell(cell.get_position(), convert_cell(&Data::from(cell.get_value().clone())));
+                sheet.check_size(chosen, input)?;
+            }
+            note_formulas(book, chosen, &sheet, &mut notes);
+        }
+        Sheets::Xlsb(book) => {
+            let mut cells = book.worksheet_cells_reader(chosen).map_err(|error| broken(&error))?;
+            while let Some(cell) = cells.next_cell().map_err(|error| broken(&error))? {
+                sheet.put_cell(cell.get_position(), convert_cell(&Data::from(cell.get_value().clone())));
+                sheet.check_size(chosen, input)?;
+            }
+        }
+        Sheets::Xls(_) | Sheets::Ods(_) => return read_block(book, chosen, input),
+    }
+    let mut table = sheet.into_table(chosen, input)?;
+    table.notes.append(&mut notes);
+    Ok(table)
+}
+
+/// A column with a name and nothing, or next to nothing, below it.
+struct BareColumn {
+    name: String,
+    /// Rows in which it has a value.
+    rows: Vec<u32>,
+}
+
+/// The most filled cells of a column that still counts as empty: a title, a name and a unit.
+const BARE_CELLS_MAX: usize = 4;
+
+/// The cells of a sheet as they come: row, column, value.
+#[derive(Default)]
+struct SparseSheet {
+    cells: Vec<(u32, u32, OwnedCell)>,
+}
+
+impl SparseSheet {
+    fn put_cell(&mut self, (row, column): (u32, u32), cell: OwnedCell) {
+        if cell != OwnedCell::Empty {
+            self.cells.push((row, column, cell));
+        }
+    }
+
+    /// Columns that have at most a few values, in a sheet with more than twice as many rows.
+    fn list_bare_columns(&self) -> BTreeMap<u32, BareColumn> {
+        let mut columns: BTreeMap<u32, BareColumn> = BTreeMap::new();
+        for (row, column, cell) in &self.cells {
+            let known =
+                columns.entry(*column).or_insert_with(|| BareColumn { name: cell.to_string(), rows: Vec::new() });
+            if known.rows.len() <= BARE_CELLS_MAX {
+                known.rows.push(*row);
+            }
+        }
+        let bounds = self.cells.iter().map(|(row, _, _)| *row);
+        let rows = bounds.clone().max().unwrap_or(0) - bounds.min().unwrap_or(0);
+        columns.retain(|_, known| known.rows.len() <= BARE_CELLS_MAX && rows as usize > 2 * known.rows.len());
+        columns
+    }
+
+    fn check_size(&self, chosen: &str, input: &Input) -> Result<(), RecordingError> {
+        if self.cells.len() <= CELLS_IN_MEMORY_MAX { Ok(()) } else { Err(too_large(chosen, input)) }
+    }
+
+    /// Rows from the first column on; what lies further right than tables go is left out, and told.
+    fn into_table(mut self, chosen: &str, input: &Input) -> Result<MemoryTable, RecordingError> {
+        self.cells.sort_by_key(|(row, column, _)| (*row, *column));
+        let first = self.cells.iter().map(|(_, column, _)| *column).min().unwrap_or(0);
+        let (mut table, mut width, mut stray) = (MemoryTable::default(), 0, 0_usize);
+        for (row, column, cell) in self.cells {
+            let place = (column - first) as usize;
+            if place >= COLUMNS_MAX {
+                stray += 1;
+                continue;
+            }
+            let line = u64::from(row) + 1;
+            if table.rows.last().is_none_or(|(last, _)| *last != line) {
+                table.rows.push((line, Vec::new()));
+            }
+            let Some((_, cells)) = table.rows.last_mut() else { continue };
+            width += place + 1 - cells.len().min(place + 1);
+            if width > CELLS_IN_MEMORY_MAX {
+                return Err(too_large(chosen, input));
+            }
+            cells.resize(place, OwnedCell::Empty);
+            cells.push(cell);
+        }
+        if stray > 0 {
+            table.form.push(Bilingual::new(
+                format!("{stray} cells further right than column {COLUMNS_MAX} are not read"),
+                format!("第{COLUMNS_MAX}列以右的{stray}个单元格未读取"),
+            ));
+        }
+        Ok(table)
+    }
+}
+
+fn too_large(chosen: &str, input: &Input) -> RecordingError {
+    RecordingError::with_format_reason(
+        &input.file,
+        format!("sheet {chosen} has more cells than are read: save it as CSV, or in parts"),
+        format!("工作表{chosen}的单元格超出限制：请另存为CSV，或分成几个文件"),
+    )
+}
+
+fn read_block(book: &mut Book, chosen: &str, input: &Input) -> Result<MemoryTable, RecordingError> {
+    let range = book.worksheet_range(chosen).map_err(|error| build_broken_error(input, &error))?;
     let (rows, columns) = range.get_size();
     if columns > COLUMNS_MAX || rows.saturating_mul(columns) > CELLS_IN_MEMORY_MAX {
         return Err(RecordingError::with_format_reason(
@@ -42,56 +167,35 @@ pub(super) fn open(input: &Input, sheet: Option<&str>) -> Result<MemoryTable, Re
     for (index, cells) in range.rows().enumerate() {
         table.rows.push((first + index as u64 + 1, cells.iter().map(convert_cell).collect()));
     }
-    note_formulas(&mut book, &chosen, &range, &mut table);
-    if names.len() > 1 {
-        table.form.push(Bilingual::new(
-            format!("sheet {chosen} of {}", names.len()),
-            format!("{}个工作表中的{chosen}", names.len()),
-        ));
-    }
     Ok(table)
 }
 
 type Book = Sheets<Cursor<Vec<u8>>>;
 
-/// Formulas whose results were never computed: a program wrote the workbook and no spreadsheet has opened it since. Looked for only where a
-/// column has nothing below its name.
-fn note_formulas(book: &mut Book, sheet: &str, range: &Range<Data>, table: &mut MemoryTable) {
-    let (rows, columns) = range.get_size();
-    let is_filled = |row: usize, column: usize| range.get((row, column)).is_some_and(|cell| *cell != Data::Empty);
-    let is_bare = |column: &usize| {
-        let filled = (0..rows).filter(|row| is_filled(*row, *column)).count();
-        filled >= 1 && filled <= 4 && rows > 2 * filled
-    };
-    let bare: Vec<usize> = (0..columns).filter(is_bare).collect();
-    let Some(formulas) = Some(()).filter(|()| !bare.is_empty()).and_then(|()| book.worksheet_formula(sheet).ok())
+/// Formulas whose results were never computed, by column: a program wrote the workbook and no spreadsheet has opened it since. Looked for
+/// only where a column has nothing below its name.
+fn note_formulas(book: &mut Xlsx<Cursor<Vec<u8>>>, chosen: &str, sheet: &SparseSheet, notes: &mut Vec<Note>) {
+    let bare = sheet.list_bare_columns();
+    let Some(mut cells) =
+        Some(()).filter(|()| !bare.is_empty()).and_then(|()| book.worksheet_cells_reader(chosen).ok())
     else {
         return;
     };
-    let (Some((first_row, first_column)), Some((formula_row, formula_column))) = (range.start(), formulas.start())
-    else {
-        return;
-    };
-    for column in bare {
-        let name = (0..rows).find_map(|row| range.get((row, column)).filter(|cell| **cell != Data::Empty));
-        let name = name.map_or_else(String::new, ToString::to_string);
-        let count = formulas
-            .used_cells()
-            .filter(|(row, at, _)| {
-                let (row, at) = (*row as u64 + u64::from(formula_row), *at as u64 + u64::from(formula_column));
-                let here = usize::try_from(row.saturating_sub(u64::from(first_row))).unwrap_or(usize::MAX);
-                at == column as u64 + u64::from(first_column) && !is_filled(here, column)
-            })
-            .count();
-        if count > 0 {
-            table.notes.push(Note::new(
-                NoteKind::Doubt,
-                format!(
-                    "{name}: {count} formulas without a stored result: open the workbook in a spreadsheet and save it"
-                ),
-                format!("{name}：{count}个公式没有保存结果：请用电子表格软件打开并保存"),
-            ));
+    let mut counts: BTreeMap<u32, usize> = BTreeMap::new();
+    while let Ok(Some(cell)) = cells.next_formula() {
+        let (row, column) = cell.get_position();
+        let without_result = bare.get(&column).is_some_and(|known| !known.rows.contains(&row));
+        if without_result && !cell.get_value().is_empty() {
+            *counts.entry(column).or_default() += 1;
         }
+    }
+    for (column, count) in counts {
+        let name = bare.get(&column).map_or("", |known| known.name.as_str());
+        notes.push(Note::new(
+            NoteKind::Doubt,
+            format!("{name}: {count} formulas without a stored result: open the workbook in a spreadsheet and save it"),
+            format!("{name}：{count}个公式没有保存结果：请用电子表格软件打开并保存"),
+        ));
     }
 }
 
@@ -112,8 +216,10 @@ fn choose_sheet(
             )
         });
     }
-    let size =
-        |book: &mut Book, name: &String| book.worksheet_range(name).map_or(0, |range| range.used_cells().count());
+    if let [only] = names {
+        return Ok(only.clone());
+    }
+    let size = |book: &mut Book, name: &String| count_cells(book, name, input);
     let mut best: Option<(usize, String)> = None;
     for name in names {
         let cells = size(book, name);
@@ -124,6 +230,14 @@ fn choose_sheet(
     best.filter(|(cells, _)| *cells > 0)
         .map(|(_, name)| name)
         .ok_or_else(|| RecordingError::with_format_reason(&input.file, "the workbook is empty", "工作簿为空"))
+}
+
+/// How many cells of a sheet hold something; none of a sheet that cannot be read.
+fn count_cells(book: &mut Book, name: &str, input: &Input) -> usize {
+    let filled = |table: MemoryTable| {
+        table.rows.iter().flat_map(|(_, cells)| cells).filter(|cell| **cell != OwnedCell::Empty).count()
+    };
+    read_sheet(book, name, input).map_or(0, filled)
 }
 
 fn convert_cell(data: &Data) -> OwnedCell {
@@ -201,7 +315,8 @@ fn unpacks_within_limit(bytes: &[u8], input: &Input) -> Result<(), RecordingErro
         }
         left -= taken;
     }
-    Ok(())
+    let content = archive.by_name("content.xml").is_ok_and(opendocument::is_too_large);
+    if content { Err(too_large("content.xml", input)) } else { Ok(()) }
 }
 
 /// The stream of an encrypted workbook, by its name in UTF-16.
@@ -228,4 +343,72 @@ fn build_broken_error(input: &Input, error: &dyn std::fmt::Display) -> Recording
         format!("not a readable workbook: {text}; save it again, or as CSV"),
         format!("无法读取的工作簿：{text}；请重新保存或另存为CSV"),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::cell::Cell;
+    use super::super::super::table::{Table, VisitStep};
+    use super::*;
+    use std::io::Write;
+
+    /// A workbook of one sheet with these cells, as small as the format allows.
+    fn workbook(cells: &str) -> Input {
+        let kind = "http://schemas.openxmlformats.org";
+        let parts = [
+            (
+                "_rels/.rels",
+                format!(
+                    "<Relationships xmlns=\"{kind}/package/2006/relationships\"><Relationship Id=\"r1\" Type=\"{kind}/officeDocument/2006/relationships/officeDocument\" Target=\"xl/workbook.xml\"/></Relationships>"
+                ),
+            ),
+            (
+                "xl/_rels/workbook.xml.rels",
+                format!(
+                    "<Relationships xmlns=\"{kind}/package/2006/relationships\"><Relationship Id=\"r1\" Type=\"{kind}/officeDocument/2006/relationships/worksheet\" Target=\"worksheets/sheet1.xml\"/></Relationships>"
+                ),
+            ),
+            (
+                "xl/workbook.xml",
+                format!(
+                    "<workbook xmlns=\"{kind}/spreadsheetml/2006/main\" xmlns:r=\"{kind}/officeDocument/2006/relationships\"><sheets><sheet name=\"s\" sheetId=\"1\" r:id=\"r1\"/></sheets></workbook>"
+                ),
+            ),
+            (
+                "xl/worksheets/sheet1.xml",
+                format!(
+                    "<worksheet xmlns=\"{kind}/spreadsheetml/2006/main\"><sheetData>{cells}</sheetData></worksheet>"
+                ),
+            ),
+        ];
+        let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+        for (name, text) in parts {
+            let stored = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+            archive.start_file(name, stored).expect("a part");
+            archive.write_all(text.as_bytes()).expect("written");
+        }
+        Input::from_memory(archive.finish().expect("an archive").into_inner(), "t.xlsx")
+    }
+
+    const TABLE: &str = "<row r=\"2\"><c r=\"B2\" t=\"str\"><v>time_s</v></c><c r=\"D2\" t=\"str\"><v>p</v></c></row>\
+                         <row r=\"3\"><c r=\"B3\"><v>0</v></c><c r=\"D3\"><v>5</v></c></row>";
+
+    #[test]
+    fn a_stray_cell_far_away_costs_nothing() {
+        let stray = "<row r=\"1048576\"><c r=\"XFD1048576\"><v>1</v></c></row>";
+        for (cells, rows) in [(TABLE.to_owned(), 2), (format!("{TABLE}{stray}"), 2)] {
+            let table = open(&workbook(&cells), None).expect("a table");
+            let mut seen = Vec::new();
+            table
+                .visit_rows(&mut |row| {
+                    let filled = row.cells.iter().filter(|cell| !matches!(cell, Cell::Empty)).count();
+                    seen.push((row.line, row.cells.len(), filled));
+                    Ok(VisitStep::Next)
+                })
+                .expect("rows");
+            assert_eq!(seen, [(2, 3, 2), (3, 3, 2)], "{rows} rows, from the first column on");
+            let told = table.form.iter().any(|form| form.en.contains("1 cells further right"));
+            assert_eq!(told, cells.contains("XFD"), "what is left out is told");
+        }
+    }
 }
