@@ -22,7 +22,6 @@ use gateway_access::Role;
 use gateway_diagnosis::files::{BroughtFile, FileDiagnoses, FileDiagnosis};
 use gateway_diagnosis::map_file::{MapProposal, ProposedColumn, verify_proposal};
 use gateway_diagnosis::model_new::{KINDS, MATERIALS, ModelKind, NewModel};
-use rules::twin::format_toml_text;
 use serde::Deserialize;
 use serde_json::{Value, json};
 

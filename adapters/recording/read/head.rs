@@ -7,6 +7,7 @@ use super::limits::HEAD_ROWS;
 use super::mapping::Mapping;
 use super::moment::written_moment;
 use super::names::ForeignName;
+use super::survey::is_annotation;
 use super::table::{OwnedCell, Table, VisitStep};
 use adapter_core::bilingual::Bilingual;
 use adapter_core::channel::unit::Unit;
@@ -70,7 +71,7 @@ pub(super) fn find_head(table: &dyn Table, given: GivenHead<'_>, file: &str) -> 
     let mut rows: Vec<HeadRow> = Vec::new();
     table.visit_rows(&mut |row| {
         let cells: Vec<OwnedCell> = row.cells.iter().map(to_owned_cell).collect();
-        if cells.iter().any(|cell| *cell != OwnedCell::Empty) {
+        if cells.iter().any(|cell| *cell != OwnedCell::Empty) && !is_annotation(row) {
             rows.push((row.line, cells));
         }
         Ok(if rows.len() < HEAD_ROWS { VisitStep::Next } else { VisitStep::Enough })
