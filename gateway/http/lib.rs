@@ -8,6 +8,7 @@
 //! demands stands in the row of the table of routes, see [`Route`].
 
 mod backtests;
+mod clicked_map;
 mod configuration_file;
 mod connection;
 mod description;

@@ -113,7 +113,7 @@ struct ColumnBuilder<'p> {
     words_bytes: usize,
     loss: Loss,
     /// The number of the row that is looked at.
-    seen: Option<f64>,
+    row_number: Option<f64>,
 }
 
 struct BlockBuilder<'p> {
@@ -135,7 +135,7 @@ impl<'p> BlockBuilder<'p> {
             words: Words::default(),
             words_bytes: 0,
             loss: Loss::default(),
-            seen: None,
+            row_number: None,
         };
         Self {
             plan,
@@ -320,8 +320,8 @@ impl ColumnBuilder<'_> {
         if self.plan.kind == PlannedKind::Words {
             return Ok(());
         }
-        self.seen = self.parse_number(cell);
-        match (self.plan.kind, cell, self.seen) {
+        self.row_number = self.parse_number(cell);
+        match (self.plan.kind, cell, self.row_number) {
             (PlannedKind::Numbers { .. }, Cell::Text(text), None) if self.plan.strict && !is_absent(text) => {
                 Err(format!(
                     "{text:?} is not a finite number with a decimal point; leave the cell empty where there is no value"
@@ -366,7 +366,7 @@ impl ColumnBuilder<'_> {
             }
             return;
         }
-        let number = self.seen;
+        let number = self.row_number;
         if number.is_none() && !is_nothing(cell) {
             self.loss.count += 1;
             if self.loss.lines.len() < 5 {

@@ -159,7 +159,7 @@ fn read_understood(
     file: &str,
 ) -> Result<ReadRecording, RecordingError> {
     let UnderstoodTable { table, head, plan } = understood;
-    let plan = plan.as_ref().map_err(RecordingError::repeat)?;
+    let plan = plan.as_ref().map_err(RecordingError::copy_error)?;
     let mut done = assemble::assemble_recordings(table.as_ref(), head, plan, mapping, file)?;
     let together = mapping.time.clocks.as_deref() == Some("rows");
     let mut notes: Vec<Note> =
