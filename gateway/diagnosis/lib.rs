@@ -11,6 +11,8 @@ pub mod handle;
 mod history;
 mod join;
 pub mod map_file;
+#[cfg(test)]
+mod map_file_tests;
 pub mod model_new;
 mod models;
 mod order;

@@ -73,7 +73,7 @@ pub struct MapProposal {
     /// Seconds from one row to the next, where a person said that there is no column of time.
     pub step: Option<f64>,
     /// Where the time was found.
-    pub found: TimePreview,
+    pub time_preview: TimePreview,
     /// The map under which the file was looked at: what it says stays.
     pub base: Mapping,
 }
@@ -103,7 +103,7 @@ impl MapProposal {
             columns: preview.columns.iter().filter(|column| !column.name.is_empty()).map(column).collect(),
             time: None,
             step: None,
-            found: preview.time.clone(),
+            time_preview: preview.time.clone(),
             base: base.clone(),
         }
     }
@@ -161,9 +161,9 @@ impl MapProposal {
         } else if let Some(time) = &self.time {
             push_text(&mut text, "column", Some(time));
         } else {
-            push_text(&mut text, "column", self.found.column.as_deref());
-            push_text(&mut text, "date", self.found.date.as_deref());
-            push_text(&mut text, "clock", self.found.clock.as_deref());
+            push_text(&mut text, "column", self.time_preview.column.as_deref());
+            push_text(&mut text, "date", self.time_preview.date.as_deref());
+            push_text(&mut text, "clock", self.time_preview.clock.as_deref());
         }
         for (key, value) in [
             ("unit", &said.unit),

@@ -137,7 +137,9 @@ fn open_on_read_only_disk(path: &Path) -> Result<Connection, HistoryError> {
 }
 
 fn refuse_empty(path: &Path, empty: bool) -> Result<(), HistoryError> {
-    let what = "it is empty".to_owned();
+    let what = "it holds nothing. A history in use keeps its newest part, at first all of it, in the file ending in -wal: copy both files \
+                together, or stop the gateway before"
+        .to_owned();
     if empty { Err(HistoryError::NotAHistory { path: path.to_owned(), what }) } else { Ok(()) }
 }
 

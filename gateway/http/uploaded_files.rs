@@ -22,7 +22,6 @@ use gateway_diagnosis::clicked_map::ClickedMap;
 use gateway_diagnosis::files::{BroughtFile, FileDiagnoses, FileDiagnosis, MapRefusal};
 use gateway_diagnosis::handle::DiagnosisHandle;
 use gateway_diagnosis::model_new::{KINDS, MATERIALS, ModelKind, NewModel};
-use rules::twin::format_toml_text;
 use serde::Deserialize;
 use serde_json::{Value, json};
 

@@ -10,6 +10,7 @@ use super::error::{RecordingError, RowProblem};
 use super::head::Head;
 use super::limits::{CELLS_MAX, DESCRIBED_MAX, WORDS_BYTES_MAX};
 use super::mapping::Mapping;
+use super::plain_number::scan_plain_number;
 use super::plan::{BlockPlan, Note, NoteKind, PlannedColumn, PlannedKind, ReadPlan, TimeKind};
 use super::restart::name_runs;
 use super::survey::{fit_row, is_comment, repeats_header};
@@ -111,6 +112,8 @@ struct ColumnBuilder<'p> {
     words: Words,
     words_bytes: usize,
     loss: Loss,
+    /// The number of the row that is looked at.
+    row_number: Option<f64>,
 }
 
 struct BlockBuilder<'p> {
@@ -132,6 +135,7 @@ impl<'p> BlockBuilder<'p> {
             words: Words::default(),
             words_bytes: 0,
             loss: Loss::default(),
+            row_number: None,
         };
         Self {
             plan,
@@ -162,8 +166,8 @@ impl<'p> BlockBuilder<'p> {
             return done.record_refusal(RowProblem { line, column: None, reason });
         };
         std::mem::take(&mut self.problems).into_iter().for_each(|problem| done.record_refusal(problem));
-        for builder in self.columns.iter().filter(|builder| builder.plan.strict) {
-            if let Err(reason) = builder.check_cell(at(builder.plan.index)) {
+        for builder in &mut self.columns {
+            if let Err(reason) = builder.look_at(at(builder.plan.index)) {
                 return done.record_refusal(RowProblem { line, column: Some(builder.plan.source.clone()), reason });
             }
         }
@@ -291,6 +295,9 @@ impl<'p> BlockBuilder<'p> {
 
 /// A number as text under a decimal sign, in the unit of its column where its cells bring their own.
 fn parse_text_number(text: &str, decimal: Decimal, units: Option<&CellUnits>) -> Option<f64> {
+    if let Some(number) = scan_plain_number(text, decimal) {
+        return units.map_or(Some(number.value), |units| units.convert_number(number.value, ""));
+    }
     let number = written_number(text)?;
     let value = number.parse_value(decimal)?;
     units.map_or(Some(value), |units| units.convert_number(value, number.suffix))
@@ -308,11 +315,14 @@ fn step_time(row: u64, step_s: f64, start: Option<RawTime>) -> RawTime {
 }
 
 impl ColumnBuilder<'_> {
-    fn check_cell(&self, cell: Cell<'_>) -> Result<(), String> {
-        match (self.plan.kind, cell) {
-            (PlannedKind::Numbers { .. }, Cell::Text(text))
-                if !is_absent(text) && self.parse_number(cell).is_none() =>
-            {
+    /// Takes the number of a cell; a cell of a strict column that holds none and is not absent refuses its row.
+    fn look_at(&mut self, cell: Cell<'_>) -> Result<(), String> {
+        if self.plan.kind == PlannedKind::Words {
+            return Ok(());
+        }
+        self.row_number = self.parse_number(cell);
+        match (self.plan.kind, cell, self.row_number) {
+            (PlannedKind::Numbers { .. }, Cell::Text(text), None) if self.plan.strict && !is_absent(text) => {
                 Err(format!(
                     "{text:?} is not a finite number with a decimal point; leave the cell empty where there is no value"
                 ))
@@ -340,18 +350,23 @@ impl ColumnBuilder<'_> {
 
     fn push(&mut self, line: u64, cell: Cell<'_>) {
         if self.plan.kind == PlannedKind::Words {
+            let owned;
             let text = match cell {
-                Cell::Text(text) if is_absent(text) => String::new(),
-                cell => text_of(cell),
+                Cell::Text(text) if is_absent(text) => "",
+                Cell::Text(text) => text,
+                cell => {
+                    owned = text_of(cell);
+                    owned.as_str()
+                }
             };
             let before = self.words.words().len();
-            self.words.push(&text);
+            self.words.push(text);
             if self.words.words().len() > before {
                 self.words_bytes += text.len() + 64;
             }
             return;
         }
-        let number = self.parse_number(cell);
+        let number = self.row_number;
         if number.is_none() && !is_nothing(cell) {
             self.loss.count += 1;
             if self.loss.lines.len() < 5 {

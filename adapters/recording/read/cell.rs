@@ -59,7 +59,8 @@ const FLAGS: [(&str, &str); 12] = [
 /// Does this text stand for no value, whatever the column?
 #[must_use]
 pub fn is_absent(text: &str) -> bool {
-    text.is_empty() || text.len() <= 11 && ABSENT.iter().any(|absent| text.eq_ignore_ascii_case(absent))
+    let may_be = matches!(text.as_bytes().first(), None | Some(b'n' | b'N' | b'-' | b'#' | b'u' | b'U'));
+    may_be && (text.is_empty() || text.len() <= 11 && ABSENT.iter().any(|absent| text.eq_ignore_ascii_case(absent)))
 }
 
 /// Does this text stand for no value in a column of numbers?
@@ -243,6 +244,7 @@ impl WrittenNumber<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::plain_number::scan_plain_number;
     use super::*;
 
     fn read(text: &str, decimal: Decimal) -> Option<f64> {
@@ -298,6 +300,19 @@ mod tests {
     }
 
     proptest::proptest! {
+        /// The quick way gives what the slow one does, to the last bit, or nothing.
+        #[test]
+        fn plain_numbers_are_the_same_numbers(text in "[+-]?[0-9]{0,12}[.,]?[0-9]{0,9}") {
+            for decimal in [Decimal::Point, Decimal::Comma] {
+                if let Some(plain) = scan_plain_number(&text, decimal) {
+                    let slow = written_number(&text).expect("a number");
+                    proptest::prop_assert_eq!(slow.shape, plain.shape, "{}", &text);
+                    proptest::prop_assert_eq!(slow.parse_value(decimal).map(f64::to_bits), Some(plain.value.to_bits()), "{}", &text);
+                    proptest::prop_assert_eq!(slow.suffix, "");
+                }
+            }
+        }
+
         #[test]
         fn no_text_makes_it_panic(text in "[0-9.,eE+\\- '%a−\u{a0}]{0,14}") {
             if let Some(number) = written_number(&text) {

@@ -44,7 +44,8 @@ pub(super) fn plan_cell_units(survey: &ColumnSurvey, unit: Option<&str>) -> Opti
             convert(suffix).map(|(factor, offset)| CellUnit { suffix: suffix.clone(), factor, offset })
         })
         .collect();
-    let alike = known.windows(2).all(|pair| pair[0].factor == pair[1].factor && pair[0].offset == pair[1].offset);
+    let key = |unit: &CellUnit| (unit.factor.to_bits(), unit.offset.to_bits());
+    let alike = known.windows(2).all(|pair| key(&pair[0]) == key(&pair[1]));
     Some(CellUnits { takes_plain: alike, known })
 }
 

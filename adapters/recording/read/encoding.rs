@@ -42,27 +42,41 @@ pub(super) fn detect_encoding(input: &Input) -> Result<DetectedEncoding, Recordi
     Ok(DetectedEncoding { encoding: guess_encoding(input)?, has_mark: false })
 }
 
+/// UTF-8 where every byte of the file fits; only else the bytes are weighed.
 fn guess_encoding(input: &Input) -> Result<&'static Encoding, RecordingError> {
+    if is_utf8(input)? {
+        return Ok(UTF_8);
+    }
     let mut bytes = input.open()?;
     let mut detector = EncodingDetector::new(Iso2022JpDetection::Deny);
-    let mut check = UTF_8.new_decoder_without_bom_handling();
-    let mut is_utf8 = true;
     let mut sample = Vec::new();
-    let (mut chunk, mut text) = (vec![0; CHUNK], vec![0; 3 * CHUNK + 16]);
+    let mut chunk = vec![0; CHUNK];
     loop {
         let length = bytes.read(&mut chunk).map_err(|error| input.build_io_error(error))?;
         let last = length == 0;
         detector.feed(&chunk[..length], last);
-        let is_foreign = |byte: &u8| !byte.is_ascii();
-        if sample.len() < CHUNK && chunk[..length].iter().any(is_foreign) {
+        if sample.len() < CHUNK && !chunk[..length].is_ascii() {
             sample.extend_from_slice(&chunk[..length]);
         }
-        if is_utf8 {
-            let (result, ..) = check.decode_to_utf8_without_replacement(&chunk[..length], &mut text, last);
-            is_utf8 = !matches!(result, DecoderResult::Malformed(..));
+        if last {
+            return Ok(guess_legacy_encoding(&detector, &sample));
+        }
+    }
+}
+
+fn is_utf8(input: &Input) -> Result<bool, RecordingError> {
+    let mut bytes = input.open()?;
+    let mut check = UTF_8.new_decoder_without_bom_handling();
+    let (mut chunk, mut text) = (vec![0; CHUNK], vec![0; 3 * CHUNK + 16]);
+    loop {
+        let length = bytes.read(&mut chunk).map_err(|error| input.build_io_error(error))?;
+        let last = length == 0;
+        let (result, ..) = check.decode_to_utf8_without_replacement(&chunk[..length], &mut text, last);
+        if matches!(result, DecoderResult::Malformed(..)) {
+            return Ok(false);
         }
         if last {
-            return Ok(if is_utf8 { UTF_8 } else { guess_legacy_encoding(&detector, &sample) });
+            return Ok(true);
         }
     }
 }

@@ -82,7 +82,7 @@ impl RecordingError {
     }
 
     /// The same error once more.
-    pub(super) fn repeat(&self) -> Self {
+    pub(super) fn copy_error(&self) -> Self {
         match self {
             Self::Io { file, error } => {
                 Self::Io { file: file.clone(), error: std::io::Error::new(error.kind(), error.to_string()) }

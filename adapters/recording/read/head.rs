@@ -7,6 +7,7 @@ use super::limits::HEAD_ROWS;
 use super::mapping::Mapping;
 use super::moment::written_moment;
 use super::names::ForeignName;
+use super::survey::is_annotation;
 use super::table::{OwnedCell, Table, VisitStep};
 use adapter_core::bilingual::Bilingual;
 use adapter_core::channel::unit::Unit;
@@ -68,9 +69,13 @@ impl<'m> GivenHead<'m> {
 /// Looks at the first rows.
 pub(super) fn find_head(table: &dyn Table, given: GivenHead<'_>, file: &str) -> Result<Head, RecordingError> {
     let mut rows: Vec<HeadRow> = Vec::new();
+    let mut is_annotated = false;
     table.visit_rows(&mut |row| {
         let cells: Vec<OwnedCell> = row.cells.iter().map(to_owned_cell).collect();
-        if cells.iter().any(|cell| *cell != OwnedCell::Empty) {
+        is_annotated |= is_annotation(row);
+        // Where every table is annotated, every table has the names above it once more.
+        let repeats = is_annotated && rows.first().is_some_and(|(_, first)| *first == cells);
+        if cells.iter().any(|cell| *cell != OwnedCell::Empty) && !is_annotation(row) && !repeats {
             rows.push((row.line, cells));
         }
         Ok(if rows.len() < HEAD_ROWS { VisitStep::Next } else { VisitStep::Enough })

@@ -113,20 +113,22 @@ pub(super) fn merge_group_line(upper: &[String], lower: &[String]) -> Option<Vec
 mod tests {
     use super::*;
 
-    fn texts(line: &str) -> Vec<String> {
+    fn split_line(line: &str) -> Vec<String> {
         line.split(',').map(str::to_owned).collect()
     }
 
     #[test]
     fn two_lines_are_one_where_they_need_one_another() {
-        let merged =
-            merge_group_line(&texts("Zeit,Spindel,,Achse X"), &texts("s,Drehzahl [1/min],Leistung [kW],Strom [A]"));
+        let merged = merge_group_line(
+            &split_line("Zeit,Spindel,,Achse X"),
+            &split_line("s,Drehzahl [1/min],Leistung [kW],Strom [A]"),
+        );
         let right = "Zeit [s],Spindel Drehzahl [1/min],Spindel Leistung [kW],Achse X Strom [A]";
-        assert_eq!(merged, Some(texts(right)));
-        let merged = merge_group_line(&texts("Time,X,,Y,"), &texts(",pos,load,pos,load"));
-        assert_eq!(merged, Some(texts("Time,X pos,X load,Y pos,Y load")));
+        assert_eq!(merged, Some(split_line(right)));
+        let merged = merge_group_line(&split_line("Time,X,,Y,"), &split_line(",pos,load,pos,load"));
+        assert_eq!(merged, Some(split_line("Time,X pos,X load,Y pos,Y load")));
         // A title is no line of names.
-        assert_eq!(merge_group_line(&texts("Operator,Smith,"), &texts("Zeit,Drehzahl,Leistung")), None);
-        assert_eq!(merge_group_line(&texts("Report,7,"), &texts("Zeit,n,n")), None);
+        assert_eq!(merge_group_line(&split_line("Operator,Smith,"), &split_line("Zeit,Drehzahl,Leistung")), None);
+        assert_eq!(merge_group_line(&split_line("Report,7,"), &split_line("Zeit,n,n")), None);
     }
 }

@@ -99,7 +99,8 @@ fn last_before(times: &[f64], at_s: f64) -> Option<usize> {
     times.partition_point(|time_s| *time_s <= at_s + 1e-9).checked_sub(1)
 }
 
-fn usual_step(times: &[f64]) -> f64 {
+/// Middle step of time that goes forward.
+pub(super) fn usual_step(times: &[f64]) -> f64 {
     let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).copied().unwrap_or(0.0)

@@ -11,7 +11,7 @@
 //! | `formats` | workbooks, LabVIEW, MATLAB, MTConnect, Parquet as the same rows of cells |
 //! | `head`, `head_form` | where the data begin, which line names the columns, which holds units; heads of known programs |
 //! | `long` | one line for each value, turned into columns |
-//! | `cell`, `cell_unit`, `moment`, `compact_moment` | what one cell may be |
+//! | `cell`, `plain_number`, `cell_unit`, `moment`, `compact_moment` | what one cell may be |
 //! | `survey`, `understand`, `targets`, `clock`, `numeric_time`, `names` | what a column is |
 //! | `assemble`, `time`, `restart`, `merge` | rows, time, tests one after the other, several clocks in one file |
 //! | `preview` | how a file is understood, for a person and for a map |
@@ -36,6 +36,7 @@ mod merge;
 mod moment;
 pub mod names;
 mod numeric_time;
+mod plain_number;
 pub(super) mod plan;
 mod preview;
 mod restart;
@@ -158,7 +159,7 @@ fn read_understood(
     file: &str,
 ) -> Result<ReadRecording, RecordingError> {
     let UnderstoodTable { table, head, plan } = understood;
-    let plan = plan.as_ref().map_err(RecordingError::repeat)?;
+    let plan = plan.as_ref().map_err(RecordingError::copy_error)?;
     let mut done = assemble::assemble_recordings(table.as_ref(), head, plan, mapping, file)?;
     let together = mapping.time.clocks.as_deref() == Some("rows");
     let mut notes: Vec<Note> =

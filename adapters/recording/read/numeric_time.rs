@@ -126,6 +126,8 @@ fn find_epoch(low: f64, high: f64) -> Option<Epoch> {
         |factor: f64, since_s: f64| low * factor - since_s > UNIX_SECONDS.0 && high * factor - since_s < UNIX_SECONDS.1;
     let unix = units.into_iter().find(|(factor, _)| fits(*factor, 0.0));
     let unix = unix.map(|(factor, word)| Epoch { factor, epoch_s: 0, word });
-    let labview = || fits(1.0, SINCE_1904_S as f64).then_some(Epoch { factor: 1.0, epoch_s: SINCE_1904_S, word: "s" });
+    #[expect(clippy::cast_precision_loss, reason = "a whole number far below 2^53")]
+    let since_1904_s = SINCE_1904_S as f64;
+    let labview = || fits(1.0, since_1904_s).then_some(Epoch { factor: 1.0, epoch_s: SINCE_1904_S, word: "s" });
     unix.or_else(labview)
 }

@@ -99,7 +99,12 @@ fn preview_time(names: &[String], time: &TimePlan) -> TimePreview {
 #[must_use]
 pub fn find_difference(before: &ReadRecording, after: &ReadRecording, changed: &[String]) -> Option<Bilingual> {
     let (a, b) = (&before.recording, &after.recording);
-    if a.count_rows() != b.count_rows() || before.refused != after.refused {
+    let has_other_rows = a.count_rows() != b.count_rows() || before.refused != after.refused;
+    if has_other_rows && !changed.is_empty() {
+        // A column that a person has named may refuse rows, and what is left is not the same.
+        return None;
+    }
+    if has_other_rows {
         let en = format!(
             "{} rows and {} refused instead of {} and {}",
             b.count_rows(),
@@ -112,7 +117,7 @@ pub fn find_difference(before: &ReadRecording, after: &ReadRecording, changed: &
         return Some(Bilingual::new(en, zh));
     }
     if a.start_ns != b.start_ns || a.time_s != b.time_s {
-        let row = (0..a.count_rows()).find(|row| a.time_s[*row] != b.time_s[*row]).unwrap_or(0);
+        let row = (0..a.count_rows()).find(|row| a.time_s[*row].total_cmp(&b.time_s[*row]).is_ne()).unwrap_or(0);
         let (was, is) = (format_time(a, row), format_time(b, row));
         let en = format!("data row {} is at {is} instead of {was}", row + 1);
         return Some(Bilingual::new(en, format!("第{}个数据行的时间为{is}，而原为{was}", row + 1)));

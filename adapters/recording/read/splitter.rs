@@ -63,6 +63,16 @@ impl Splitter {
     fn feed_csv(&mut self, mut bytes: &[u8], see: &mut SeeTexts<'_>) -> Result<VisitStep, SplitError> {
         let at_end = bytes.is_empty();
         loop {
+            if self.filled == (0, 0) {
+                let (left, step) = self.feed_plain_rows(bytes, see)?;
+                bytes = left;
+                if matches!(step, VisitStep::Enough) {
+                    return Ok(VisitStep::Enough);
+                }
+                if bytes.is_empty() && !at_end {
+                    return Ok(VisitStep::Next);
+                }
+            }
             let (text, ends) = self.filled;
             let (result, read, written, ended) =
                 self.csv.read_record(bytes, &mut self.text[text..], &mut self.ends[ends..]);
@@ -93,6 +103,43 @@ impl Splitter {
         }
     }
 
+    /// Rows that end within these bytes and hold no quote and no lone return: most rows of most files. What is left begins with another one.
+    fn feed_plain_rows<'b>(
+        &mut self,
+        mut bytes: &'b [u8],
+        see: &mut SeeTexts<'_>,
+    ) -> Result<(&'b [u8], VisitStep), SplitError> {
+        let Separator::Sign(sign) = self.separator else { return Ok((bytes, VisitStep::Next)) };
+        let mut texts: Vec<&str> = Vec::new();
+        while let Some(end) = memchr::memchr(b'\n', bytes) {
+            let line = bytes[..end].strip_suffix(b"\r").unwrap_or(&bytes[..end]);
+            if memchr::memchr2(b'"', b'\r', line).is_some() {
+                break;
+            }
+            // The decoder gives UTF-8; what is none is left to the slow way.
+            let Ok(text) = std::str::from_utf8(line) else { break };
+            bytes = &bytes[end + 1..];
+            self.newlines += 1;
+            if text.is_empty() {
+                continue;
+            }
+            texts.clear();
+            let mut start = 0;
+            for at in memchr::memchr_iter(sign, line) {
+                texts.push(trim_cell(&text[start..at]));
+                start = at + 1;
+            }
+            texts.push(trim_cell(&text[start..]));
+            if texts.len() > COLUMNS_MAX {
+                return Err(SplitError::TooLong(self.newlines));
+            }
+            if matches!(see(self.newlines, &texts).map_err(SplitError::Visit)?, VisitStep::Enough) {
+                return Ok((bytes, VisitStep::Enough));
+            }
+        }
+        Ok((bytes, VisitStep::Next))
+    }
+
     fn emit_row(&self, end: u64, see: &mut SeeTexts<'_>) -> Result<VisitStep, SplitError> {
         let (length, cells) = self.filled;
         let text = String::from_utf8_lossy(&self.text[..length]);
@@ -103,11 +150,7 @@ impl Splitter {
         let mut start = 0;
         let mut texts = Vec::with_capacity(cells);
         for end in &self.ends[..cells] {
-            texts.push(
-                text.get(start..*end)
-                    .unwrap_or("")
-                    .trim_matches(['\u{feff}', ' ', '\t', '\r', '\n', '\u{a0}', '\u{3000}']),
-            );
+            texts.push(trim_cell(text.get(start..*end).unwrap_or("")));
             start = *end;
         }
         let inner = text.matches('\n').count() as u64;
@@ -139,6 +182,15 @@ impl Splitter {
         }
         if cells.is_empty() { Ok(VisitStep::Next) } else { see(number, &cells).map_err(SplitError::Visit) }
     }
+}
+
+/// Without the spaces of any script around it.
+fn trim_cell(text: &str) -> &str {
+    let is_plain = |byte: Option<&u8>| byte.is_none_or(u8::is_ascii_graphic);
+    if is_plain(text.as_bytes().first()) && is_plain(text.as_bytes().last()) {
+        return text;
+    }
+    text.trim_matches(['\u{feff}', ' ', '\t', '\r', '\n', '\u{a0}', '\u{3000}'])
 }
 
 /// Cells between spaces; a quoted cell may hold spaces.

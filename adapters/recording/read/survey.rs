@@ -1,10 +1,11 @@
 //! What stands in each column, counted over every row before anything is decided: one strange cell in the first row decides nothing.
 
-use super::cell::{Cell, Shape, is_absent, is_absent_number, parse_flag, written_number};
+use super::cell::{Cell, Decimal, Shape, is_absent, is_absent_number, parse_flag, written_number};
 use super::compact_moment::{CompactKind, parse_compact};
 use super::error::RecordingError;
 use super::head::Head;
 use super::moment::{OrderEvidence, written_moment};
+use super::plain_number::scan_plain_number;
 use super::table::{Row, Table, VisitStep};
 use adapter_core::clock::SECOND_NS;
 use std::collections::BTreeMap;
@@ -58,6 +59,8 @@ pub(super) struct ColumnSurvey {
     /// Any other word.
     pub(super) words: u64,
     pub(super) word_examples: Vec<Example>,
+    last_word: String,
+    last_is_flag: bool,
     /// Of the numbers, under a decimal point: least, greatest, whether each is the one before plus one.
     pub(super) range: Option<(f64, f64)>,
     first: Option<f64>,
@@ -109,6 +112,30 @@ impl ColumnSurvey {
     }
 
     fn see_text(&mut self, line: u64, text: &str) {
+        if let Some(number) = scan_plain_number(text, Decimal::Point) {
+            match number.shape {
+                Shape::Whole => {
+                    self.whole += 1;
+                    self.see_digits(text);
+                }
+                Shape::PointOrThousands => self.point_or_thousands += 1,
+                _ => {
+                    self.point += 1;
+                    self.point_example.get_or_insert_with(|| Example { line, text: text.to_owned() });
+                }
+            }
+            self.record_number(number.value);
+        } else if self.last_word == text && !text.is_empty() {
+            // As the row before: most columns of words go on for a while.
+            self.words += u64::from(!self.last_is_flag);
+            self.flags += u64::from(self.last_is_flag);
+        } else {
+            self.see_other_text(line, text);
+        }
+    }
+
+    /// A text that is no plain number.
+    fn see_other_text(&mut self, line: u64, text: &str) {
         if is_absent(text) {
             self.absent += 1;
         } else if let Some(number) = written_number(text) {
@@ -128,7 +155,7 @@ impl ColumnSurvey {
             }
             self.see_suffix(number.suffix);
             self.see_digits(text);
-            if let Some(number) = number.parse_value(super::cell::Decimal::Point) {
+            if let Some(number) = number.parse_value(Decimal::Point) {
                 self.record_number(number);
             }
         } else if let Some(moment) = written_moment(text) {
@@ -144,14 +171,21 @@ impl ColumnSurvey {
         } else if let Some((pair, _)) = parse_flag(text) {
             self.flags += 1;
             self.see_pair(pair);
+            self.remember_word(text, true);
         } else if is_absent_number(text) {
             self.absent += 1;
         } else {
             self.words += 1;
+            self.remember_word(text, false);
             if self.word_examples.len() < EXAMPLES {
                 self.word_examples.push(Example { line, text: text.chars().take(40).collect() });
             }
         }
+    }
+
+    fn remember_word(&mut self, text: &str, is_flag: bool) {
+        text.clone_into(&mut self.last_word);
+        self.last_is_flag = is_flag;
     }
 
     fn see_suffix(&mut self, suffix: &str) {
@@ -167,6 +201,9 @@ impl ColumnSurvey {
     }
 
     fn see_digits(&mut self, text: &str) {
+        if !matches!(text.len(), 6 | 8 | 12 | 14..) {
+            return;
+        }
         match parse_compact(text) {
             Some((CompactKind::Moment, _)) => self.compact_moments += 1,
             Some((CompactKind::Date, _)) => self.compact_dates += 1,
@@ -222,11 +259,15 @@ pub(super) fn repeats_header(row: &Row<'_>, head: &Head) -> bool {
 /// First cells of the lines that InfluxDB writes before every table of its annotated CSV.
 const ANNOTATIONS: [&str; 3] = ["#group", "#datatype", "#default"];
 
+/// Does the row say of what kind the columns of the next table are?
+pub(super) fn is_annotation(row: &Row<'_>) -> bool {
+    matches!(row.cells.first(), Some(Cell::Text(text)) if ANNOTATIONS.contains(text))
+}
+
 /// A line of remarks among the data: a sign before it, and not as many cells as there are columns.
 pub(super) fn is_comment(row: &Row<'_>, head: &Head) -> bool {
-    matches!(row.cells.first(), Some(Cell::Text(text)) if ANNOTATIONS.contains(text))
-        || matches!(row.cells.first(), Some(Cell::Text(text)) if text.starts_with('#') || text.starts_with("//"))
-            && row.cells.iter().filter(|cell| **cell != Cell::Empty).count() < head.names.len()
+    matches!(row.cells.first(), Some(Cell::Text(text)) if text.starts_with('#') || text.starts_with("//"))
+        && (is_annotation(row) || row.cells.iter().filter(|cell| **cell != Cell::Empty).count() < head.names.len())
 }
 
 /// The cells of a row that belong to columns with a name; `None` where the row is wider or narrower than the header.

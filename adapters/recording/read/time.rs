@@ -1,6 +1,7 @@
 //! From the cells of time to seconds: zones, the night of the clock change, stamps that stand still, clocks that jump.
 
 use super::mapping::TimeMapping;
+use super::merge::usual_step;
 use super::plan::{Note, NoteKind};
 use super::restart::{divide_at, note_restarts};
 use crate::Words;
@@ -202,13 +203,6 @@ fn end_of_summer_time(utc: &mut [TimeNs], notes: &mut Vec<Note>) {
             format!("第{}个数据行时钟后退一小时：按夏令时结束处理", row + 1),
         ));
     }
-}
-
-/// Middle step of time that goes forward.
-fn usual_step(times: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied().unwrap_or(0.0)
 }
 
 fn join_set_back(times: &mut [f64], notes: &mut Vec<Note>) {

@@ -7,11 +7,11 @@ mod matlab;
 mod mtconnect;
 mod opendocument;
 mod parquet;
-mod refused;
 mod shdr;
 mod tdms;
 mod tdms_channel;
 mod tdms_scaling;
+mod unread;
 mod workbook;
 
 use super::encoding::Decoded;
@@ -38,7 +38,7 @@ fn catch_damage<T>(input: &Input, read: impl FnOnce() -> Result<T, RecordingErro
 /// Opens a file as a table.
 pub(super) fn open_table(input: Input, mapping: &Mapping) -> Result<Box<dyn Table>, RecordingError> {
     let head = input.read_head(1024)?;
-    refused::refuse_by_name(&head, &input)?;
+    unread::refuse_by_name(&head, &input)?;
     if head.starts_with(b"PAR1") {
         return Ok(Box::new(catch_damage(&input, || parquet::open(&input))?));
     }

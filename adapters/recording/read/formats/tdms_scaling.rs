@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 /// As an input: the raw values.
-const RAW: f64 = 4_294_967_295.0;
+const RAW: u32 = u32::MAX;
 
 /// What the properties of an object say.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -67,8 +67,9 @@ impl TdmsScaling {
                 _ => None,
             };
             // A scale that takes what itself gives would never end.
-            let source = number("Input_Source").filter(|source| *source != RAW);
-            scale = source.and_then(|source| (0..index).find(|lower| f64::from(*lower) == source));
+            let is = |number: u32, source: &f64| f64::from(number).total_cmp(source).is_eq();
+            let source = number("Input_Source").filter(|source| !is(RAW, source));
+            scale = source.and_then(|source| (0..index).find(|lower| is(*lower, &source)));
             let coefficients = coefficients.filter(|_| source.is_none() || scale.is_some());
             steps.push(coefficients.ok_or_else(|| format!("{kind:?} (NI_Scale[{index}])"))?);
         }
@@ -85,7 +86,7 @@ fn compute_polynomial(coefficients: &[f64], x: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn scaling(numbers: &[(&str, f64)], texts: &[(&str, &str)]) -> TdmsScaling {
+    fn build_scaling(numbers: &[(&str, f64)], texts: &[(&str, &str)]) -> TdmsScaling {
         let mut found = TdmsScaling::default();
         numbers.iter().for_each(|(name, number)| found.accept_number(name, *number));
         texts.iter().for_each(|(name, text)| found.accept_text(name, (*text).to_owned()));
@@ -96,8 +97,11 @@ mod tests {
     fn raw_values_become_those_of_the_channel() {
         let linear = [("NI_Scale[0]_Linear_Slope", 0.1), ("NI_Scale[0]_Linear_Y_Intercept", 2.0)];
         let kind = ("NI_Scale[0]_Scale_Type", "Linear");
-        assert_eq!(scaling(&linear, &[kind]).scale_values(&[50.0]), Ok(vec![7.0]));
-        assert_eq!(scaling(&linear, &[kind, ("NI_Scaling_Status", "scaled")]).scale_values(&[50.0]), Ok(vec![50.0]));
+        assert_eq!(build_scaling(&linear, &[kind]).scale_values(&[50.0]), Ok(vec![7.0]));
+        assert_eq!(
+            build_scaling(&linear, &[kind, ("NI_Scaling_Status", "scaled")]).scale_values(&[50.0]),
+            Ok(vec![50.0])
+        );
         let chain = [
             linear[0],
             linear[1],
@@ -108,8 +112,8 @@ mod tests {
             ("NI_Scale[1]_Polynomial_Input_Source", 0.0),
         ];
         let both = [kind, ("NI_Scale[1]_Scale_Type", "Polynomial")];
-        assert_eq!(scaling(&chain, &both).scale_values(&[50.0]), Ok(vec![99.0]));
-        let table = scaling(&[], &[("NI_Scale[0]_Scale_Type", "Table")]).scale_values(&[1.0]);
+        assert_eq!(build_scaling(&chain, &both).scale_values(&[50.0]), Ok(vec![99.0]));
+        let table = build_scaling(&[], &[("NI_Scale[0]_Scale_Type", "Table")]).scale_values(&[1.0]);
         assert!(table.is_err_and(|kind| kind.contains("Table")));
     }
 }

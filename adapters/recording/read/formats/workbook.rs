@@ -76,6 +76,14 @@ struct BareColumn {
 /// The most filled cells of a column that still counts as empty: a title, a name and a unit.
 const BARE_CELLS_MAX: usize = 4;
 
+fn describe_cell(cell: &OwnedCell) -> String {
+    match cell {
+        OwnedCell::Text(text) => text.to_string(),
+        OwnedCell::Number(number) => number.to_string(),
+        _ => String::new(),
+    }
+}
+
 /// The cells of a sheet as they come: row, column, value.
 #[derive(Default)]
 struct SparseSheet {
@@ -94,7 +102,7 @@ impl SparseSheet {
         let mut columns: BTreeMap<u32, BareColumn> = BTreeMap::new();
         for (row, column, cell) in &self.cells {
             let known =
-                columns.entry(*column).or_insert_with(|| BareColumn { name: cell.to_string(), rows: Vec::new() });
+                columns.entry(*column).or_insert_with(|| BareColumn { name: describe_cell(cell), rows: Vec::new() });
             if known.rows.len() <= BARE_CELLS_MAX {
                 known.rows.push(*row);
             }

@@ -149,11 +149,10 @@ fn one_line_for_each_value_becomes_columns() {
         (column(&got, "n"), column(&got, "P")),
         (vec![Some(800.0), Some(801.0)], vec![Some(310.0), Some(311.0)])
     );
-    let shdr = "2026-03-17T08:15:00Z|avail|AVAILABLE\n2026-03-17T08:15:00Z|Srpm|800|Spower|310\n2026-03-17T08:15:00Z|Zcond|NORMAL||||\n\
-                2026-03-17T08:15:01Z|Srpm|900|Spower|320\n2026-03-17T08:15:02Z|Srpm|UNAVAILABLE|Spower|330\n";
-    let got = read(shdr).expect("SHDR").recording;
-    assert_eq!(column(&got, "Spower"), [Some(310.0), Some(320.0), Some(330.0)]);
-    assert_eq!(column(&got, "Srpm")[..2], [Some(800.0), Some(900.0)]);
+    let seconds = (0..30).map(|s| format!("2026-03-17T08:15:{s:02}Z|Srpm|{}|Spower|{}\n", 800 + s, 310 + s));
+    let begin = "2026-03-17T08:15:00Z|avail|AVAILABLE\n2026-03-17T08:15:00Z|Zcond|NORMAL||||\n".to_owned();
+    let got = read(&(begin + &seconds.collect::<String>())).expect("SHDR").recording;
+    assert_eq!((got.count_rows(), column(&got, "Spower")[29], column(&got, "Srpm")[1]), (30, Some(339.0), Some(801.0)));
     assert_eq!(got.find_words("Zcond").and_then(|words| words.get(2)), Some("NORMAL"));
 }
 

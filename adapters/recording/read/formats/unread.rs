@@ -11,60 +11,75 @@ struct RefusedFormat {
     cure_zh: &'static str,
 }
 
-const fn refuse(start: &'static [u8], name: &'static str, cure: &'static str, cure_zh: &'static str) -> RefusedFormat {
+const fn define_refusal(
+    start: &'static [u8],
+    name: &'static str,
+    cure: &'static str,
+    cure_zh: &'static str,
+) -> RefusedFormat {
     RefusedFormat { start, name, cure, cure_zh }
 }
 
-const PICKLE: (&str, &str, &str) =
-    ("a pickle of Python", "write Parquet in its place (to_parquet)", "请改用Parquet（to_parquet）");
+const PICKLE: &str = "a pickle of Python";
+const TO_PARQUET: (&str, &str) = ("write Parquet in its place (to_parquet)", "请改用Parquet（to_parquet）");
 const TO_CSV: (&str, &str) = ("export it as CSV or MAT (version 7)", "请导出为CSV或MAT（版本7）");
 const UNPACK: (&str, &str) = ("unpack it first", "请先解压");
 
 const REFUSED: &[RefusedFormat] = &[
-    refuse(
+    define_refusal(
         b"\x89HDF\r\n\x1a\n",
         "HDF5",
         "export it as CSV or Parquet (pandas: to_csv, to_parquet)",
         "请导出为CSV或Parquet（pandas：to_csv、to_parquet）",
     ),
-    refuse(b"MDF     ", "an MDF file (ASAM)", TO_CSV.0, TO_CSV.1),
-    refuse(b"UnFinMF ", "an MDF file (ASAM) that was not finished", TO_CSV.0, TO_CSV.1),
-    refuse(b"|CF,", "a file of imc (FAMOS)", TO_CSV.0, TO_CSV.1),
-    refuse(b"DEWE", "a file of Dewesoft", TO_CSV.0, TO_CSV.1),
-    refuse(
+    define_refusal(b"MDF     ", "an MDF file (ASAM)", TO_CSV.0, TO_CSV.1),
+    define_refusal(b"UnFinMF ", "an MDF file (ASAM) that was not finished", TO_CSV.0, TO_CSV.1),
+    define_refusal(b"|CF,", "a file of imc (FAMOS)", TO_CSV.0, TO_CSV.1),
+    define_refusal(b"DEWE", "a file of Dewesoft", TO_CSV.0, TO_CSV.1),
+    define_refusal(
         b"SQLite format 3\0",
         "a database of SQLite",
         "a history of this box is written history:FILE",
         "本网关的历史数据库请写作history:文件",
     ),
-    refuse(b"ARROW1", "Feather (Arrow)", "write Parquet in its place (to_parquet)", "请改用Parquet（to_parquet）"),
-    refuse(b"FEA1", "Feather (version 1)", "write Parquet in its place (to_parquet)", "请改用Parquet（to_parquet）"),
-    refuse(b"RIFF", "a sound file", "export it as CSV with its rate", "请连同采样率导出为CSV"),
-    refuse(b"7z\xbc\xaf", "a 7z archive", UNPACK.0, UNPACK.1),
-    refuse(b"Rar!", "a RAR archive", UNPACK.0, UNPACK.1),
-    refuse(b"%PDF", "a PDF", "export the table as CSV or xlsx", "请将表格导出为CSV或xlsx"),
-    refuse(
+    define_refusal(
+        b"ARROW1",
+        "Feather (Arrow)",
+        "write Parquet in its place (to_parquet)",
+        "请改用Parquet（to_parquet）",
+    ),
+    define_refusal(b"FEA1", "Feather (version 1)", TO_PARQUET.0, TO_PARQUET.1),
+    define_refusal(b"RIFF", "a sound file", "export it as CSV with its rate", "请连同采样率导出为CSV"),
+    define_refusal(b"7z\xbc\xaf", "a 7z archive", UNPACK.0, UNPACK.1),
+    define_refusal(b"Rar!", "a RAR archive", UNPACK.0, UNPACK.1),
+    define_refusal(b"%PDF", "a PDF", "export the table as CSV or xlsx", "请将表格导出为CSV或xlsx"),
+    define_refusal(
         b"\x93NUMPY",
         "an array of NumPy (npy)",
         "write CSV (numpy.savetxt with a header)",
         "请写成CSV（numpy.savetxt并带表头）",
     ),
-    refuse(b"\x80\x02", PICKLE.0, PICKLE.1, PICKLE.2),
-    refuse(b"\x80\x03", PICKLE.0, PICKLE.1, PICKLE.2),
-    refuse(b"\x80\x04\x95", PICKLE.0, PICKLE.1, PICKLE.2),
-    refuse(b"\x80\x05\x95", PICKLE.0, PICKLE.1, PICKLE.2),
-    refuse(b"ccopy_reg\n", PICKLE.0, PICKLE.1, PICKLE.2),
-    refuse(b"cnumpy", PICKLE.0, PICKLE.1, PICKLE.2),
-    refuse(b"cpandas", PICKLE.0, PICKLE.1, PICKLE.2),
-    refuse(b"RDX3\n", "a workspace of R", "write it as CSV (write.csv)", "请导出为CSV（write.csv）"),
-    refuse(
+    define_refusal(b"\x80\x02", PICKLE, TO_PARQUET.0, TO_PARQUET.1),
+    define_refusal(b"\x80\x03", PICKLE, TO_PARQUET.0, TO_PARQUET.1),
+    define_refusal(b"\x80\x04\x95", PICKLE, TO_PARQUET.0, TO_PARQUET.1),
+    define_refusal(b"\x80\x05\x95", PICKLE, TO_PARQUET.0, TO_PARQUET.1),
+    define_refusal(b"ccopy_reg\n", PICKLE, TO_PARQUET.0, TO_PARQUET.1),
+    define_refusal(b"cnumpy", PICKLE, TO_PARQUET.0, TO_PARQUET.1),
+    define_refusal(b"cpandas", PICKLE, TO_PARQUET.0, TO_PARQUET.1),
+    define_refusal(b"RDX3\n", "a workspace of R", "write it as CSV (write.csv)", "请导出为CSV（write.csv）"),
+    define_refusal(
         b"\x28\xb5\x2f\xfd",
         "a file packed by zstd",
         "unpack it first, or pack it with gzip",
         "请先解压，或用gzip压缩",
     ),
-    refuse(b"BZh", "a file packed by bzip2", "unpack it first, or pack it with gzip", "请先解压，或用gzip压缩"),
-    refuse(b"\xfd7zXZ", "a file packed by xz", "unpack it first, or pack it with gzip", "请先解压，或用gzip压缩"),
+    define_refusal(b"BZh", "a file packed by bzip2", "unpack it first, or pack it with gzip", "请先解压，或用gzip压缩"),
+    define_refusal(
+        b"\xfd7zXZ",
+        "a file packed by xz",
+        "unpack it first, or pack it with gzip",
+        "请先解压，或用gzip压缩",
+    ),
 ];
 
 /// Endings of names whose first bytes say nothing.
