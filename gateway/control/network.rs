@@ -3,7 +3,6 @@
 //! Less than a person: it cannot arm, cannot disarm, and cannot let a second feed hold pass. What it asks is judged by the
 //! gate like the request of a script, at every tick, and only while the configuration of its sink says `allow_requests`.
 
-use adapter_core::clock::TimeNs;
 use std::fmt;
 use thiserror::Error;
 
@@ -164,13 +163,13 @@ pub struct RequestOrigin {
     /// What the asker calls himself.
     pub asker: Option<String>,
     /// When it was asked for, by the asker's clock, ns since 1970.
-    pub issued_ns: Option<TimeNs>,
+    pub issued_ns: Option<i64>,
 }
 
 impl RequestOrigin {
     /// Of these words, cut and freed of control characters.
     #[must_use]
-    pub fn from_words(id: Option<&str>, asker: Option<&str>, issued_ns: Option<TimeNs>) -> Self {
+    pub fn from_words(id: Option<&str>, asker: Option<&str>, issued_ns: Option<i64>) -> Self {
         let clean = |text: &str| Some(clean_text(text)).filter(|text| !text.is_empty());
         Self { id: id.and_then(clean), asker: asker.and_then(clean), issued_ns }
     }

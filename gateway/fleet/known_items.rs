@@ -6,7 +6,7 @@ use super::names::Names;
 use super::row::FleetRow;
 use gateway_history::RESENT_EPOCH;
 use serde_json::Value as Json;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use tokio_postgres::Client;
 
 /// What names an item whatever its number: box, time, kind. Of records also what they say.
@@ -31,7 +31,20 @@ fn is_resent(row: &FleetRow<'_>) -> bool {
 
 /// A gap is known by its beginning: how it ended may be told later.
 fn key_of_record(kind: &str, record: Option<&Json>) -> Option<String> {
-    record.filter(|_| kind != "gap").map(Json::to_string)
+    record.filter(|_| kind != "gap").map(format_sorted)
+}
+
+/// The same text for the same content: the database keeps the fields of an object in another order.
+fn format_sorted(json: &Json) -> String {
+    match json {
+        Json::Array(items) => format!("[{}]", items.iter().map(format_sorted).collect::<Vec<_>>().join(",")),
+        Json::Object(fields) => {
+            let sorted: BTreeMap<&String, String> =
+                fields.iter().map(|(name, value)| (name, format_sorted(value))).collect();
+            format!("{sorted:?}")
+        }
+        one => one.to_string(),
+    }
 }
 
 impl KnownItems {

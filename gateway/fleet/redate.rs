@@ -24,6 +24,12 @@ struct KnownMove {
     by_ns: i64,
 }
 
+impl KnownMove {
+    fn holds(&self, row: &FleetRow<'_>) -> bool {
+        self.epoch == row.epoch && (self.from_sequence..self.to_sequence).contains(&row.sequence)
+    }
+}
+
 /// The moves that the database knows.
 #[derive(Debug, Default)]
 pub(super) struct KnownMoves {
@@ -56,10 +62,8 @@ impl KnownMoves {
     /// Moves an item by what it has not been moved yet.
     pub(super) fn settle_time(&self, row: &mut FleetRow<'_>) {
         let Some(moves) = self.of_boxes.get(&*row.box_name) else { return };
-        let holds = |known: &&KnownMove| {
-            known.epoch == row.epoch && (known.from_sequence..known.to_sequence).contains(&row.sequence)
-        };
-        let total = moves.iter().filter(holds).fold(0_i64, |sum, known| sum.saturating_add(known.by_ns));
+        let total =
+            moves.iter().filter(|known| known.holds(row)).fold(0_i64, |sum, known| sum.saturating_add(known.by_ns));
         let by_ns = total.saturating_sub(row.redated_ns);
         // What no move names has the time that the box gave it.
         if total != 0 && by_ns != 0 {
@@ -82,6 +86,32 @@ const COUNT: &str = "SELECT count(*) FROM clock_moves";
 pub(super) fn tells_moves(row: &FleetRow<'_>) -> bool {
     let moves = |record: &Json| record["kind"] == "clock_redated" && record["detail"]["moves"].is_array();
     row.kind == "event" && row.record.as_ref().is_some_and(moves)
+}
+
+/// Items that an event of the same batch moves: their means are of other minutes.
+#[derive(Debug, Default)]
+pub(super) struct MovesOfBatch<'r>(Vec<(&'r str, KnownMove)>);
+
+impl<'r> MovesOfBatch<'r> {
+    /// Those that these items tell.
+    pub(super) fn from_rows(rows: impl Iterator<Item = &'r FleetRow<'r>>) -> Self {
+        let mut moves = Vec::new();
+        for row in rows.filter(|row| tells_moves(row)) {
+            let told = row.record.as_ref().and_then(|record| record["detail"]["moves"].as_array());
+            for one in told.into_iter().flatten() {
+                let number = |name: &str| one[name].as_i64().unwrap_or(0);
+                let [epoch, from_sequence, to_sequence, by_ns] =
+                    ["epoch", "from_sequence", "to_sequence", "by_ns"].map(number);
+                moves.push((&*row.box_name, KnownMove { epoch, from_sequence, to_sequence, by_ns }));
+            }
+        }
+        Self(moves)
+    }
+
+    /// Does one of them move this item?
+    pub(super) fn hold(&self, row: &FleetRow<'_>) -> bool {
+        self.0.iter().any(|(name, known)| *name == row.box_name && known.holds(row))
+    }
 }
 
 /// Moves the items that the events of this batch name, and everything that was made of them.

@@ -6,7 +6,7 @@ use super::known_items::KnownItems;
 use super::latest::Latest;
 use super::means::{self, MeanRows};
 use super::names::Names;
-use super::redate::{self, KnownMoves};
+use super::redate::{self, KnownMoves, MovesOfBatch};
 use super::row::FleetRow;
 use super::schema::{self, Partition, Partitioning};
 use gateway_nats::NatsError;
@@ -152,6 +152,7 @@ impl Database {
         let (mut items, mut records) = (CopyRows::new(), CopyRows::new());
         let (mut latest, mut of_levels) = (Latest::default(), [const { None::<MeanRows> }; means::LEVELS.len()]);
         let mut times = BTreeSet::new();
+        let moves = MovesOfBatch::from_rows(rows.iter().map(|arrived| arrived.row));
         for Arrived { row, arrived_us } in rows {
             let Some(box_id) = self.names.box_id(&row.box_name) else { continue };
             let series: Vec<i32> = row.series_names().filter_map(|series| self.names.series_id(series)).collect();
@@ -171,6 +172,9 @@ impl Database {
                 times.extend(until_us.map(|until_us| ("state_list", day_of(until_us))));
             }
             latest.add(box_id, row, &series, *arrived_us);
+            if moves.hold(row) {
+                continue;
+            }
             for (level, rows) in means::LEVELS.iter().zip(&mut of_levels).filter(|(level, _)| *level.kind == *row.kind)
             {
                 rows.get_or_insert_default().add(level, box_id, row, &series);

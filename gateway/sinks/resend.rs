@@ -35,9 +35,9 @@ impl Resender {
         let name = format!("{name}-resend");
         let sink: Box<dyn Sink> = match address.target() {
             SinkTarget::Nats(target) => Box::new(NatsSink::new(target.clone(), &name, outbox)),
-            SinkTarget::Mqtt(target) => {
-                Box::new(MqttSink::new(target.clone(), (&name, Requests::without_gate()), outbox).with_items_only())
-            }
+            SinkTarget::Mqtt(target) => Box::new(
+                MqttSink::new(target.clone(), (name.as_str(), Requests::without_gate()), outbox).with_items_only(),
+            ),
             _ => return None,
         };
         Some(Self { sink, connected: false, pace_s: 1.0 / rate_per_s, next: None, sent: 0, refused: 0 })

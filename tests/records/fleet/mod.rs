@@ -17,6 +17,7 @@ mod redated;
 mod resent;
 mod restored;
 mod secured;
+mod shifts;
 mod sizes;
 mod told;
 mod versions;

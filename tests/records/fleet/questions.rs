@@ -162,6 +162,11 @@ fn every_question_is_answered_as_the_boxes_know() {
         let at_work: f64 = shifts.iter().map(|row| row[4].parse().unwrap_or(0.0) * row[7].parse().unwrap_or(0.0)).sum();
         near(at_work * 3600.0, truth.seconds_by_state["idle"] + truth.seconds_by_state["cutting"], "time at work");
     }
+    let by_day = asked(&plant, "energy-by-day");
+    for (machine, truth) in &truths {
+        let kwh: f64 = of(&by_day, machine).iter().map(|row| number(&row[2])).sum();
+        near(kwh * 3.6e6, truth.power * SPAN_S as f64, "all energy, also between parts");
+    }
     let operations = asked(&plant, "energy-per-operation");
     let total: f64 = operations.iter().map(|row| number(&row[5])).sum();
     near(total * 3.6e6, truths.iter().map(|(_, truth)| truth.operation_j).sum(), "energy of the operations");
