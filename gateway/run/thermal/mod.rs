@@ -178,7 +178,7 @@ impl Thermal {
             prediction.error_um.sd = prediction.error_um.sd.hypot(stand_in_sd_um);
         }
         let sd_um = predicted.as_ref().ok().map(|it| it.error_um.sd);
-        self.sensor_alarms.follow(sample.at_ns, &self.sensor_watch, &self.sensors, sd_um, health);
+        self.sensor_alarms.follow_watch(sample.at_ns, &self.sensor_watch, &self.sensors, sd_um, health);
         let residual = match &predicted {
             Ok(prediction) => self.compare_with_reading(prediction, sample, health),
             Err(_) => ExtraValue::Missing("no_prediction"),

@@ -41,7 +41,7 @@ fn law() -> ThermalLaw {
     let column = |at: usize, row: &[f64; 3]| if at == 0 { 1.0 } else { row[at - 1] };
     let product = |a: usize, b: usize| rows.iter().map(|row| column(a, row) * column(b, row)).sum::<f64>();
     let sums: Vec<Vec<f64>> = (0..4).map(|a| (0..4).map(|b| product(a, b)).collect()).collect();
-    let covariance = crate::thermal::sensor_model::invert(&sums).expect("it can be inverted");
+    let covariance = crate::thermal::sensor_model::invert_matrix(&sums).expect("it can be inverted");
     let range = |at: usize| {
         let values = rows.iter().map(|row| row[at]);
         (values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max))
