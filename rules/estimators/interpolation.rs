@@ -24,6 +24,9 @@ const EXPONENT_SPAN: f64 = 0.2;
 /// Speeds to extrapolate from stand apart by this much in the logarithm.
 const APART: f64 = 0.1;
 
+/// Beyond the known speeds, a straight line that amplifies noise no more than this serves in the place of a quadratic that does.
+const LINE_GAIN_OUTSIDE: f64 = 1.5;
+
 /// An extrapolating quadratic that amplifies noise more than this gives way to the straight line, if that is calm.
 const NOISE_GAIN_OUTSIDE: f64 = 3.0 + 1e-9;
 
@@ -143,7 +146,7 @@ impl StagePowers {
             },
             None => Weights::from_speed_triple(speeds, select_adjacent_speeds(speeds, n), n),
         };
-        if noise_gain(&quadratic.weight) > NOISE_GAIN_OUTSIDE && line.is_noise_bounded() {
+        if noise_gain(&quadratic.weight) > NOISE_GAIN_OUTSIDE && noise_gain(&line.weight) <= LINE_GAIN_OUTSIDE {
             return Some((line, self.by_law(n)));
         }
         Some((quadratic, line))
