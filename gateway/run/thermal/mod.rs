@@ -219,7 +219,7 @@ impl Thermal {
             Err(_) => return ExtraValue::Missing("no_reading"),
         };
         let soon = self.read_ns.is_some_and(|then_ns| (0..READING_EVERY_NS).contains(&(sample.at_ns - then_ns)));
-        if self.settings.learn && !soon && self.sensor_watch.doubted().is_empty() {
+        if self.settings.learn && !soon && self.sensor_watch.list_doubted().is_empty() {
             self.read_ns = Some(sample.at_ns);
             let correction = self.follower.correct_with_reading(prediction, measured_um);
             if let Ok(text) = serde_json::to_string(&self.follower.to_corrected_law()) {

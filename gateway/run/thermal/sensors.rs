@@ -48,7 +48,7 @@ impl SensorAlarms {
         };
         let due = |doubted: &&DoubtedSensor| doubted.fault != SensorFault::Lost || at_ns - doubted.since_ns >= LOST_NS;
         let doubted: Vec<(String, DoubtedSensor)> =
-            watch.doubted().iter().filter(due).filter_map(|it| Some((code_of(it)?, *it))).collect();
+            watch.list_doubted().iter().filter(due).filter_map(|it| Some((code_of(it)?, *it))).collect();
         self.standing.retain(|alarm| {
             let stays = doubted.iter().any(|(code, it)| *code == alarm.code && it.fault == alarm.fault);
             if !stays {

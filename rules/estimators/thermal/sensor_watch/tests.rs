@@ -95,12 +95,12 @@ fn run_day(seed: u64, air_c: f64, sensor: usize, spoil: impl Fn(f64, f64) -> Opt
             temperatures[sensor] = spoil(before, noisy[sensor]).ok_or(Absence::Timeout);
         }
         watch.replace_doubted(at_s as i64 * SECOND_NS, &mut temperatures);
-        let wrong = watch.doubted().iter().filter(|it| it.sensor != sensor || !failed).count();
+        let wrong = watch.list_doubted().iter().filter(|it| it.sensor != sensor || !failed).count();
         found.false_doubts += wrong;
         if !failed {
             continue;
         }
-        let first = watch.doubted().iter().find(|it| it.sensor == sensor);
+        let first = watch.list_doubted().iter().find(|it| it.sensor == sensor);
         found.told = found.told.or(first.map(|it| (it.sensor, it.fault, at_s - 4 * 3600)));
         let predicted: f64 =
             INTERCEPT_UM + temperatures.iter().zip(SLOPES).map(|(it, slope)| it.unwrap_or(0.0) * slope).sum::<f64>();
@@ -168,7 +168,7 @@ fn a_sensor_that_comes_back_is_believed_again() {
             _ => {}
         }
         watch.replace_doubted(at_s as i64 * SECOND_NS, &mut temperatures);
-        doubted_at.extend(watch.doubted().iter().map(|it| (it.sensor, at_s)));
+        doubted_at.extend(watch.list_doubted().iter().map(|it| (it.sensor, at_s)));
     }
     assert!(doubted_at.iter().all(|(sensor, at_s)| *sensor == 1 && (3600..6200).contains(at_s)), "{doubted_at:?}");
     assert!(!doubted_at.iter().any(|(_, at_s)| (4200..6000).contains(at_s)), "{doubted_at:?}");

@@ -47,7 +47,7 @@ const FORGET_S: f64 = 1800.0;
 /// What is wrong with a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SensorFault {
-    /// It gives no value.
+    /// It gives no value at this moment.
     Lost,
     /// It has changed faster than heat can.
     Jumped,
@@ -64,7 +64,7 @@ pub struct DoubtedSensor {
     pub sensor: usize,
     /// What is wrong with it.
     pub fault: SensorFault,
-    /// Since when, ns.
+    /// When it was first not believed, ns since 1970.
     pub since_ns: TimeNs,
     /// What stands in for it, °C, with its deviation; `None` where the law does not tell.
     pub stand_in_c: Option<Estimate>,
@@ -119,7 +119,7 @@ impl SensorWatch {
 
     /// The sensors that are not believed now.
     #[must_use]
-    pub fn doubted(&self) -> &[DoubtedSensor] {
+    pub fn list_doubted(&self) -> &[DoubtedSensor] {
         &self.doubted_sensors
     }
 
