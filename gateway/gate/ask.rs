@@ -77,7 +77,7 @@ struct Latch {
     /// Was one sent, and has nobody seen to it?
     latched: bool,
     /// The reason of the one that was sent last.
-    sent: Option<Arc<str>>,
+    sent_reason: Option<Arc<str>>,
 }
 
 impl Latch {
@@ -94,7 +94,7 @@ impl Latch {
 
     /// Does a latched request wait, because it is another one than the one that was sent?
     fn makes_wait(&self, ask: &ScriptRequest, outcome: AskOutcome) -> bool {
-        let other = self.sent.as_ref().is_none_or(|sent| !is_same_request(ask.request, sent, &ask.reason));
+        let other = self.sent_reason.as_ref().is_none_or(|sent| !is_same_request(ask.request, sent, &ask.reason));
         outcome == AskOutcome::Latched && other
     }
 
@@ -111,7 +111,7 @@ impl Latch {
             let outcome = self.judge_request(known, armed);
             let waits = outcome.map_or(known.is_some_and(|known| known.waits), |outcome| self.makes_wait(ask, outcome));
             if outcome == Some(AskOutcome::Sent) {
-                (self.latched, self.sent) = (true, Some(ask.reason.clone()));
+                (self.latched, self.sent_reason) = (true, Some(ask.reason.clone()));
             }
             self.standing.push(StandingRequest { reason: ask.reason.clone(), waits });
             judged.extend(outcome.map(|outcome| ((*ask).clone(), outcome)));

@@ -110,11 +110,14 @@ impl Trail {
             return None;
         }
         let Author { script, version, reason } = self.find_author(written);
+        // Read right after a withdrawal, the machine still shows what it is about to leave: that is not what came of it.
+        let returned = matches!(written.occasion, Occasion::Release | Occasion::Leftover) && written.fault.is_none();
+        let after = written.after.filter(|after| !returned || Some(*after) != written.before);
         Some(Audit {
             outcome: if written.fault.is_some() { "failed" } else { "written" }.to_owned(),
             before: written.before.map(to_percent),
             asked: Some(to_percent(written.asked)),
-            after: written.after.map(to_percent),
+            after: after.map(to_percent),
             reason: describe_reason(written, &reason),
             script,
             script_version: version,

@@ -195,7 +195,7 @@ impl Thermal {
             prediction.error_um.sd = prediction.error_um.sd.hypot(stand_in_sd_um);
         }
         let sd_um = predicted.as_ref().ok().map(|it| it.error_um.sd);
-        self.sensor_alarms.follow(sample.at_ns, &self.sensor_watch, &self.sensors, sd_um, health);
+        self.sensor_alarms.follow_watch(sample.at_ns, &self.sensor_watch, &self.sensors, sd_um, health);
         let residual = match &predicted {
             Ok(prediction) => self.compare_with_reading(prediction, sample, health),
             Err(_) => ExtraValue::Missing("no_prediction"),
@@ -236,7 +236,7 @@ impl Thermal {
             Err(_) => return ExtraValue::Missing("no_reading"),
         };
         let soon = self.read_ns.is_some_and(|then_ns| (0..READING_EVERY_NS).contains(&(sample.at_ns - then_ns)));
-        if self.settings.learn && !soon && self.sensor_watch.doubted().is_empty() {
+        if self.settings.learn && !soon && self.sensor_watch.list_doubted().is_empty() {
             self.read_ns = Some(sample.at_ns);
             let correction = self.follower.correct_with_reading(prediction, measured_um);
             if let Ok(text) = serde_json::to_string(&self.follower.to_corrected_law()) {

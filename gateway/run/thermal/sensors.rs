@@ -35,7 +35,7 @@ impl SensorAlarms {
     }
 
     /// Raises and ends alarms by what the watch says now; `sd_um` is the deviation of the prediction, where there is one.
-    pub(super) fn follow(
+    pub(super) fn follow_watch(
         &mut self,
         at_ns: TimeNs,
         watch: &SensorWatch,
@@ -48,7 +48,7 @@ impl SensorAlarms {
         };
         let due = |doubted: &&DoubtedSensor| doubted.fault != SensorFault::Lost || at_ns - doubted.since_ns >= LOST_NS;
         let doubted: Vec<(String, DoubtedSensor)> =
-            watch.doubted().iter().filter(due).filter_map(|it| Some((code_of(it)?, *it))).collect();
+            watch.list_doubted().iter().filter(due).filter_map(|it| Some((code_of(it)?, *it))).collect();
         self.standing.retain(|alarm| {
             let stays = doubted.iter().any(|(code, it)| *code == alarm.code && it.fault == alarm.fault);
             if !stays {
@@ -61,7 +61,7 @@ impl SensorAlarms {
             if self.standing.iter().any(|alarm| alarm.code == code) {
                 continue;
             }
-            let [en, zh] = self.describe(&doubted, sensors[doubted.sensor].name(), sd_um);
+            let [en, zh] = self.describe_alarm(&doubted, sensors[doubted.sensor].name(), sd_um);
             let (source, severity) = (super::SOURCE.to_owned(), "warning".to_owned());
             let raised = Alarm { at_ns, code: code.clone(), source, severity, en: en.clone(), zh: zh.clone() };
             health.keep_record(raised.into());
@@ -70,7 +70,7 @@ impl SensorAlarms {
     }
 
     /// What the operator reads, English and Chinese.
-    fn describe(&self, doubted: &DoubtedSensor, name: &str, sd_um: Option<f64>) -> [String; 2] {
+    fn describe_alarm(&self, doubted: &DoubtedSensor, name: &str, sd_um: Option<f64>) -> [String; 2] {
         let (what, zh_what) = match doubted.fault {
             SensorFault::Lost => ("gives no value", "无数据"),
             SensorFault::Jumped => ("has changed faster than heat can", "变化快于热过程"),

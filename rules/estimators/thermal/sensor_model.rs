@@ -25,10 +25,10 @@ impl SensorModel {
     /// of a regression on temperatures within the ranges that the law states, or where a sensor is none of its.
     #[must_use]
     pub fn from_law(law: &ThermalLaw, sensors: &[&str]) -> Option<Self> {
-        let columns = invert(&law.covariance)?;
+        let columns = invert_matrix(&law.covariance)?;
         let scale = columns.first()?.first().copied().filter(|scale| *scale > 0.0)?;
         let first_term = |sensor: &&str| law.terms.iter().position(|term| term.sensor == **sensor);
-        let terms: Vec<usize> = sensors.iter().map(|sensor| first_term(sensor)).collect::<Option<_>>()?;
+        let terms: Vec<usize> = sensors.iter().map(first_term).collect::<Option<_>>()?;
         let mean_c: Vec<f64> = terms.iter().map(|term| columns[0][term + 1] / scale).collect();
         let product = |a: usize, b: usize| columns[terms[a] + 1][terms[b] + 1] / scale - mean_c[a] * mean_c[b];
         let all = 0..terms.len();
@@ -71,7 +71,8 @@ impl SensorModel {
         let noise = |a: usize, b: usize| if a == b { READING_VARIANCE } else { 0.0 };
         let row = |a: usize| others.iter().map(|(b, _)| self.covariance[a][*b] + noise(a, *b)).collect::<Vec<f64>>();
         let with: Vec<f64> = others.iter().map(|(at, _)| self.covariance[sensor][*at]).collect();
-        let weights = solve(others.iter().map(|(at, _)| row(*at)).collect(), with.clone()).unwrap_or_default();
+        let weights =
+            solve_symmetric(others.iter().map(|(at, _)| row(*at)).collect(), with.clone()).unwrap_or_default();
         let away = others.iter().zip(&weights).map(|((at, value), weight)| weight * (value - self.mean_c[*at]));
         let explained: f64 = weights.iter().zip(&with).map(|(weight, with)| weight * with).sum();
         let variance = (self.covariance[sensor][sensor] - explained).max(0.0) + READING_VARIANCE;
@@ -80,13 +81,13 @@ impl SensorModel {
 }
 
 /// The inverse of a small symmetric matrix; `None` where there is none.
-pub(super) fn invert(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+pub(super) fn invert_matrix(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     let unit = |at: usize| (0..matrix.len()).map(|row| if row == at { 1.0 } else { 0.0 }).collect();
-    (0..matrix.len()).map(|at| solve(matrix.to_vec(), unit(at))).collect()
+    (0..matrix.len()).map(|at| solve_symmetric(matrix.to_vec(), unit(at))).collect()
 }
 
 /// Solves a small symmetric system by elimination with pivots; `None` where it is singular.
-fn solve(mut matrix: Vec<Vec<f64>>, mut right: Vec<f64>) -> Option<Vec<f64>> {
+fn solve_symmetric(mut matrix: Vec<Vec<f64>>, mut right: Vec<f64>) -> Option<Vec<f64>> {
     let size = right.len();
     for column in 0..size {
         let pivot = (column..size).max_by(|a, b| matrix[*a][column].abs().total_cmp(&matrix[*b][column].abs()))?;

@@ -41,7 +41,7 @@ fn law() -> ThermalLaw {
     let column = |at: usize, row: &[f64; 3]| if at == 0 { 1.0 } else { row[at - 1] };
     let product = |a: usize, b: usize| rows.iter().map(|row| column(a, row) * column(b, row)).sum::<f64>();
     let sums: Vec<Vec<f64>> = (0..4).map(|a| (0..4).map(|b| product(a, b)).collect()).collect();
-    let covariance = crate::thermal::sensor_model::invert(&sums).expect("it can be inverted");
+    let covariance = crate::thermal::sensor_model::invert_matrix(&sums).expect("it can be inverted");
     let range = |at: usize| {
         let values = rows.iter().map(|row| row[at]);
         (values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max))
@@ -95,12 +95,12 @@ fn run_day(seed: u64, air_c: f64, sensor: usize, spoil: impl Fn(f64, f64) -> Opt
             temperatures[sensor] = spoil(before, noisy[sensor]).ok_or(Absence::Timeout);
         }
         watch.replace_doubted(at_s as i64 * SECOND_NS, &mut temperatures);
-        let wrong = watch.doubted().iter().filter(|it| it.sensor != sensor || !failed).count();
+        let wrong = watch.list_doubted().iter().filter(|it| it.sensor != sensor || !failed).count();
         found.false_doubts += wrong;
         if !failed {
             continue;
         }
-        let first = watch.doubted().iter().find(|it| it.sensor == sensor);
+        let first = watch.list_doubted().iter().find(|it| it.sensor == sensor);
         found.told = found.told.or(first.map(|it| (it.sensor, it.fault, at_s - 4 * 3600)));
         let predicted: f64 =
             INTERCEPT_UM + temperatures.iter().zip(SLOPES).map(|(it, slope)| it.unwrap_or(0.0) * slope).sum::<f64>();
@@ -168,7 +168,7 @@ fn a_sensor_that_comes_back_is_believed_again() {
             _ => {}
         }
         watch.replace_doubted(at_s as i64 * SECOND_NS, &mut temperatures);
-        doubted_at.extend(watch.doubted().iter().map(|it| (it.sensor, at_s)));
+        doubted_at.extend(watch.list_doubted().iter().map(|it| (it.sensor, at_s)));
     }
     assert!(doubted_at.iter().all(|(sensor, at_s)| *sensor == 1 && (3600..6200).contains(at_s)), "{doubted_at:?}");
     assert!(!doubted_at.iter().any(|(_, at_s)| (4200..6000).contains(at_s)), "{doubted_at:?}");

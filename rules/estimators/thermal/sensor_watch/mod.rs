@@ -47,7 +47,7 @@ const FORGET_S: f64 = 1800.0;
 /// What is wrong with a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SensorFault {
-    /// It gives no value.
+    /// It gives no value at this moment.
     Lost,
     /// It has changed faster than heat can.
     Jumped,
@@ -64,7 +64,7 @@ pub struct DoubtedSensor {
     pub sensor: usize,
     /// What is wrong with it.
     pub fault: SensorFault,
-    /// Since when, ns.
+    /// When it was first not believed, ns since 1970.
     pub since_ns: TimeNs,
     /// What stands in for it, °C, with its deviation; `None` where the law does not tell.
     pub stand_in_c: Option<Estimate>,
@@ -74,7 +74,7 @@ pub struct DoubtedSensor {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct WatchedSensor {
     /// The last value that was believed, what the others said then, and when.
-    believed: Option<Believed>,
+    last_believed: Option<Believed>,
     fault: Option<(SensorFault, TimeNs)>,
     near_since_ns: Option<TimeNs>,
     settled_since_ns: Option<TimeNs>,
@@ -107,20 +107,20 @@ struct Flat {
 pub struct SensorWatch {
     model: Option<SensorModel>,
     sensors: Vec<WatchedSensor>,
-    doubted: Vec<DoubtedSensor>,
+    doubted_sensors: Vec<DoubtedSensor>,
 }
 
 impl SensorWatch {
     /// For so many sensors; without a model nothing can stand in, and only rate and absence are judged.
     #[must_use]
     pub fn new(model: Option<SensorModel>, sensors: usize) -> Self {
-        Self { model, sensors: vec![WatchedSensor::default(); sensors], doubted: Vec::new() }
+        Self { model, sensors: vec![WatchedSensor::default(); sensors], doubted_sensors: Vec::new() }
     }
 
     /// The sensors that are not believed now.
     #[must_use]
-    pub fn doubted(&self) -> &[DoubtedSensor] {
-        &self.doubted
+    pub fn list_doubted(&self) -> &[DoubtedSensor] {
+        &self.doubted_sensors
     }
 
     /// Takes the temperatures of a moment and puts what stands in for them in the place of those that are not believed; where nothing
@@ -135,15 +135,15 @@ impl SensorWatch {
             .collect();
         let worst = self.model.as_ref().and_then(|model| find_contradicted(model, &seen, &expected));
         for (at, sensor) in self.sensors.iter_mut().enumerate() {
-            sensor.judge(at_ns, seen[at], expected[at], worst == Some(at));
+            sensor.judge_value(at_ns, seen[at], expected[at], worst == Some(at));
         }
-        self.doubted.clear();
+        self.doubted_sensors.clear();
         let mut variance = 0.0;
         for (at, sensor) in self.sensors.iter().enumerate() {
             let Some((fault, since_ns)) = sensor.fault else { continue };
             // Nothing was ever read of it: the others are all there is.
-            let stand_in_c = expected[at].map(|expected| sensor.stand_in(at_ns, expected));
-            self.doubted.push(DoubtedSensor { sensor: at, fault, since_ns, stand_in_c });
+            let stand_in_c = expected[at].map(|expected| sensor.compute_stand_in(at_ns, expected));
+            self.doubted_sensors.push(DoubtedSensor { sensor: at, fault, since_ns, stand_in_c });
             let slope = self.model.as_ref().map_or(0.0, |model| model.slope_um_per_k(at));
             variance += stand_in_c.map_or(0.0, |stand_in| (slope * stand_in.sd).powi(2));
             temperatures_c[at] = match (stand_in_c, temperatures_c[at]) {
@@ -169,7 +169,7 @@ fn find_contradicted(model: &SensorModel, seen: &[Option<f64>], expected: &[Opti
 }
 
 impl WatchedSensor {
-    fn judge(&mut self, at_ns: TimeNs, seen_c: Option<f64>, expected: Option<Estimate>, contradicted: bool) {
+    fn judge_value(&mut self, at_ns: TimeNs, seen_c: Option<f64>, expected: Option<Estimate>, contradicted: bool) {
         let Some(value_c) = seen_c else {
             (self.near_since_ns, self.settled_since_ns, self.flat) = (None, None, None);
             self.fault.get_or_insert((SensorFault::Lost, at_ns));
@@ -187,22 +187,23 @@ impl WatchedSensor {
             () => None,
         };
         match fault {
-            Some(fault) => self.doubt(fault, at_ns),
-            None => self.believed = Some(Believed { at_ns, value_c, expected_c: expected.map(|it| it.value) }),
+            Some(fault) => self.doubt_sensor(fault, at_ns),
+            None => self.last_believed = Some(Believed { at_ns, value_c, expected_c: expected.map(|it| it.value) }),
         }
     }
 
-    fn doubt(&mut self, fault: SensorFault, at_ns: TimeNs) {
+    fn doubt_sensor(&mut self, fault: SensorFault, at_ns: TimeNs) {
         self.fault = Some((fault, at_ns));
         // What stood still was right when that began.
         if let (SensorFault::Frozen, Some(flat)) = (fault, self.flat) {
-            self.believed = Some(Believed { at_ns: flat.since_ns, value_c: flat.value_c, expected_c: flat.expected_c });
+            self.last_believed =
+                Some(Believed { at_ns: flat.since_ns, value_c: flat.value_c, expected_c: flat.expected_c });
         }
         (self.near_since_ns, self.settled_since_ns) = (None, None);
     }
 
     fn has_jumped(&self, at_ns: TimeNs, value_c: f64) -> bool {
-        self.believed.is_some_and(|before| {
+        self.last_believed.is_some_and(|before| {
             let elapsed_ns = at_ns - before.at_ns;
             let most_k = JUMP_K + RATE_K_PER_S * to_seconds(elapsed_ns);
             (0..=RATE_WITHIN_NS).contains(&elapsed_ns) && (value_c - before.value_c).abs() > most_k
@@ -238,8 +239,8 @@ impl WatchedSensor {
     }
 
     /// What stands in for it: what the others say, beginning with what it said last.
-    fn stand_in(&self, at_ns: TimeNs, expected: Estimate) -> Estimate {
-        let Some(Believed { at_ns: then_ns, value_c, expected_c: Some(then_c) }) = self.believed else {
+    fn compute_stand_in(&self, at_ns: TimeNs, expected: Estimate) -> Estimate {
+        let Some(Believed { at_ns: then_ns, value_c, expected_c: Some(then_c) }) = self.last_believed else {
             return expected;
         };
         let left = (-to_seconds((at_ns - then_ns).max(0)) / FORGET_S).exp();
@@ -251,13 +252,13 @@ impl WatchedSensor {
 
     fn judge_return(&mut self, at_ns: TimeNs, value_c: f64, expected: Option<Estimate>) {
         let Some((fault, _)) = self.fault else { return };
-        let stand_in = expected.map(|expected| self.stand_in(at_ns, expected));
+        let stand_in = expected.map(|expected| self.compute_stand_in(at_ns, expected));
         let moves = fault != SensorFault::Frozen
             || self.flat.is_some_and(|flat| flat.looks <= 1.0)
             || self.near_since_ns.is_some();
         let tolerance_k = |stand_in: Estimate| NEAR_K.max(stand_in.sd);
         let near = moves
-            && match (stand_in, self.believed) {
+            && match (stand_in, self.last_believed) {
                 (Some(stand_in), _) => (value_c - stand_in.value).abs() <= tolerance_k(stand_in),
                 (None, Some(_)) => !self.has_jumped(at_ns, value_c),
                 (None, None) => true,
@@ -272,7 +273,7 @@ impl WatchedSensor {
             |since_ns: Option<TimeNs>, least_ns: i64| since_ns.is_some_and(|since_ns| at_ns - since_ns >= least_ns);
         if at_once || lasts(near_since_ns, NEAR_NS) || (moves && lasts(settled_since_ns, SETTLED_NS)) {
             (self.fault, self.near_since_ns, self.settled_since_ns) = (None, None, None);
-            self.believed = Some(Believed { at_ns, value_c, expected_c: expected.map(|it| it.value) });
+            self.last_believed = Some(Believed { at_ns, value_c, expected_c: expected.map(|it| it.value) });
         }
     }
 }
