@@ -1,10 +1,10 @@
 //! A model over the inputs of a recording, and how far it is from what was recorded.
 
 use recording::Recording;
-use rules::twin::diagnosis::find_output_unit;
-use rules::twin::text_report::format_short_number;
 use rules::twin::Model;
+use rules::twin::diagnosis::find_output_unit;
 use rules::twin::simulate::{SimulatedRows, simulate_recording};
+use rules::twin::text_report::format_short_number;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 

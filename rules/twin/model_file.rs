@@ -131,8 +131,19 @@ impl<'t> Reader<'t> {
     }
 
     fn read_part(&mut self, table: &Table<'_>, offset: usize) -> Option<Part> {
-        let known =
-            ["kind", "name", "parameters", "fixed", "columns", "expression", "process", "form", "place", "gear_stage", "departure"];
+        let known = [
+            "kind",
+            "name",
+            "parameters",
+            "fixed",
+            "columns",
+            "expression",
+            "process",
+            "form",
+            "place",
+            "gear_stage",
+            "departure",
+        ];
         self.report_unknown_keys(table, &known, "an [[effect]]");
         let Some(kind) = table.get("kind").and_then(|kind| kind.get_ref().as_str()) else {
             self.report_problem(offset, "an [[effect]] needs a kind".to_owned());

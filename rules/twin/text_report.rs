@@ -148,7 +148,8 @@ impl Say<'_> {
     fn describe_estimate(&self, estimate: &ParameterEstimate) -> String {
         let (name, unit) = (&estimate.name, if estimate.unit == "1" { "" } else { &estimate.unit });
         let value = format_short_number(estimate.value);
-        let (Some(low), Some(high)) = (estimate.low.map(format_short_number), estimate.high.map(format_short_number)) else {
+        let (Some(low), Some(high)) = (estimate.low.map(format_short_number), estimate.high.map(format_short_number))
+        else {
             return self.language.select_text(
                 format!("{name} = {value} {unit} (interval not computed)"),
                 format!("{name} = {value} {unit}（未计算区间）"),

@@ -109,7 +109,9 @@ fn render_certainty(data: &Data<'_>, missing: &Missing) -> String {
     if let Some(probability) = missing.probability {
         let shown = format_fixed(probability, 2);
         words.push(match data.tongue.0 {
-            Language::En => format!("The probability of this name is {shown}, averaged over resamples of the recording."),
+            Language::En => {
+                format!("The probability of this name is {shown}, averaged over resamples of the recording.")
+            }
             Language::Zh => format!("该名称的概率为{shown}（对记录多次重采样取平均）。"),
         });
     }

@@ -90,8 +90,11 @@ impl StartSearch {
             let ranked = (0..all[turn].len()).map(|number| (left(&number), number));
             chosen[turn] = ranked.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, number)| number);
         }
-        let with: Vec<&LawStart> =
-            all.iter().zip(chosen).map(|(starts, chosen)| chosen.map(|number| &starts[number])).collect::<Option<_>>()?;
+        let with: Vec<&LawStart> = all
+            .iter()
+            .zip(chosen)
+            .map(|(starts, chosen)| chosen.map(|number| &starts[number]))
+            .collect::<Option<_>>()?;
         Some(self.solve_sizes(&with).parts)
     }
 

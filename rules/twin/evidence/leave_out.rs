@@ -74,7 +74,9 @@ impl LeftOut {
             (0..size).for_each(|index| inner[[index, index]] += RIDGE * rows + self.ridges[index]);
             let right: Array1<f64> = others.slice(s![..size, size]).to_owned();
             let step = if size > 0 { CholeskyFactor::from_matrix(&inner).solve_system(&right) } else { right };
-            let left = |at: &usize| self.left[*at] - (0..size).map(|index| step[index] * self.columns[index][*at]).sum::<f64>();
+            let left = |at: &usize| {
+                self.left[*at] - (0..size).map(|index| step[index] * self.columns[index][*at]).sum::<f64>()
+            };
             square += part.iter().map(|at| left(at).powi(2)).sum::<f64>();
         }
         square

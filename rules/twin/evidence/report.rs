@@ -5,18 +5,18 @@
 //! textbook law bears out is taken back.
 
 use super::answer::{EvidenceAnswer, sum_contributions};
+use super::contributions::project_out_baseline;
 use super::gram::Comparison;
 use super::inputs::RecordingInputs;
 use super::noise::NoiseModel;
-use super::contributions::project_out_baseline;
 use super::textbook::Textbook;
 use super::thresholds::THRESHOLDS;
 use super::written_model::WrittenModel;
+use crate::departure::{DEPARTURE, Departure};
 use crate::diagnosis::{
     Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, UNKNOWN, Verdict,
     find_output_unit,
 };
-use crate::departure::Departure;
 use crate::fit::Fit;
 use crate::inputs::mark_rows_with_inputs;
 use crate::intervals::FittedRows;
@@ -68,8 +68,15 @@ impl EvidenceReport<'_, '_> {
         let written = self.tell_written_model(&textbook);
         let fits = self.compare_fits(&curve);
         let missing = self.list_missing_effects(&fits, &textbook, written.as_ref());
+        let open = self.list_undetermined_names(&missing);
+        if self.answer.verdict == Verdict::Explained && !open.is_empty() {
+            self.answer.add_unknown_rivals(&open);
+        }
         let alternatives: Vec<Alternative> = self.list_alternatives();
-        let parts = written.map_or_else(|| self.baseline.parts.clone(), |written| written.parts);
+        let parts = match written {
+            Some(written) => written.parts,
+            None => self.refit_baseline().unwrap_or_else(|| self.case.model.parts.clone()),
+        };
         let shift = if missing.is_empty() { Vec::new() } else { self.list_shifts(&parts) };
         let model = Model { parts, ..self.case.model.clone() };
         let withdrawn = self.answer.withdrawn.take();
@@ -183,7 +190,9 @@ impl EvidenceReport<'_, '_> {
                 statement,
                 equation,
                 parameters,
-                delta_ic: own.map(|own| own.information).or_else(|| (!told).then_some(self.answer.information)),
+                delta_ic: own
+                    .map(|own| own.information)
+                    .or_else(|| (name == UNKNOWN).then_some(self.answer.information)),
                 probability: self.answer.find_probability(name),
                 held_out_rmse_before: own
                     .and_then(|own| own.error_without)
@@ -197,7 +206,7 @@ impl EvidenceReport<'_, '_> {
         all
     }
 
-    fn estimate_parameters(&self, fit: &Fit, place: usize) -> Vec<ParameterEstimate> {
+    pub(super) fn estimate_parameters(&self, fit: &Fit, place: usize) -> Vec<ParameterEstimate> {
         let rows = &self.comparison.rows;
         let rows = FittedRows {
             scene: &self.case.scene,
@@ -208,7 +217,9 @@ impl EvidenceReport<'_, '_> {
             unit: rows.iter().map(|row| self.inputs.unit[*row]).collect(),
             of_model: self.baseline.parts.len(),
         };
-        rows.estimate_parameters(place)
+        let mut all = rows.estimate_parameters(place);
+        all.retain(|estimate| !estimate.name.starts_with(DEPARTURE));
+        all
     }
 
     /// The size of a curve that has no law: its root mean square. No fit tells how well it is known.

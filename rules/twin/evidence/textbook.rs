@@ -173,7 +173,9 @@ pub(super) fn build_candidate(
     let mut part = Part::from_effect(effect, form, names);
     for parameter in &mut part.parameters {
         if let Some(doc) = effect.doc().find_parameter(&parameter.name) {
-            parameter.range = effect.parameter_range(scene, doc);
+            // What a file may hold bounds what is possible for this output.
+            let (low, high) = effect.parameter_range(scene, doc);
+            parameter.range = (low.max(doc.range.0), high.min(doc.range.1));
             parameter.value = parameter.value.clamp(parameter.range.0, parameter.range.1);
         }
     }

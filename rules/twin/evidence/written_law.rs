@@ -6,7 +6,7 @@ use super::report::EvidenceReport;
 use crate::channel::{SIMULATED_CUT, TIME, read_channel_values};
 use crate::departure::{DEPARTURE_USUAL, Departure};
 use crate::fit::Fit;
-use crate::model::Part;
+use crate::model::{Part, simulate_parts};
 use numerics::linear::columns::dot;
 use numerics::statistics::quantile;
 use physics::Role;
@@ -26,7 +26,8 @@ impl EvidenceReport<'_, '_> {
     pub(super) fn fit_named_laws(&mut self, near: &[(String, Part)]) -> Option<Fit> {
         let first = self.fit_from_starts(near)?;
         let best = self.mend_by_subsets(near, first);
-        Some(self.add_departures(best))
+        let wider = self.add_departures(best);
+        Some(self.settle_parameters(wider))
     }
 
     /// Of the fits from the nearest laws and from the output the one that leaves least of rows left out.
@@ -72,7 +73,8 @@ impl EvidenceReport<'_, '_> {
                 let mut parts = fewer.parts;
                 parts.insert(first + gone, near[gone].1.clone());
                 let again = self.refit_parts(&parts);
-                best = again.filter(|again| self.sum_left_squares(again) < self.sum_left_squares(&best)).unwrap_or(best);
+                best =
+                    again.filter(|again| self.sum_left_squares(again) < self.sum_left_squares(&best)).unwrap_or(best);
             }
         }
         best
@@ -96,6 +98,10 @@ impl EvidenceReport<'_, '_> {
     fn add_departures(&mut self, fit: Fit) -> Fit {
         let mut best = fit;
         for _ in 0..DEPARTURES_MAX {
+            // The scene holds load and output of whatever was fitted last.
+            if simulate_parts(&best.parts, &mut self.case.scene).is_none() {
+                break;
+            }
             let Some((place, departure)) = self.find_best_departure(&best) else { break };
             let before = self.prepare_left_out(&best).compute_square();
             let mut parts = best.parts.clone();
@@ -162,9 +168,16 @@ impl EvidenceReport<'_, '_> {
             let x: Vec<f64> =
                 KNOTS.iter().filter_map(|share| quantile(rows.iter().map(|row| values[*row]), *share)).collect();
             let (low, high) = (*x.first()?, *x.last()?);
-            let rises = x.windows(2).all(|pair| pair[1] - pair[0] > 0.02 * (high - low)) && high - low > 1e-6 * high.abs();
+            let rises =
+                x.windows(2).all(|pair| pair[1] - pair[0] > 0.02 * (high - low)) && high - low > 1e-6 * high.abs();
             // Two levels have no middle.
-            let x = if rises { x } else if high - low > 1e-6 * high.abs() { vec![low, 0.5 * (low + high), high] } else { return None };
+            let x = if rises {
+                x
+            } else if high - low > 1e-6 * high.abs() {
+                vec![low, 0.5 * (low + high), high]
+            } else {
+                return None;
+            };
             Some(Departure { over, x })
         };
         over.filter_map(build).collect()
