@@ -178,10 +178,7 @@ impl EvidenceReport<'_, '_> {
             let place = textbook.laws.get(at).copied().flatten().map(|(place, _)| place).filter(|_| written.is_some());
             let fit = textbook.fit.as_ref();
             let own = fit.zip(place).and_then(|(fit, place)| self.measure_own_figures(fit, place));
-            let parameters = match fit.zip(place) {
-                Some((fit, place)) => self.estimate_parameters(fit, place),
-                None => self.compute_curve_size(name),
-            };
+            let parameters = fit.zip(place).map_or_else(Vec::new, |(fit, place)| self.estimate_parameters(fit, place));
             let part = written.zip(place).map(|(written, place)| &written.parts[place]);
             let (statement, equation) = describe_law(name, part);
             let told = place.is_some() || name == UNKNOWN;
@@ -220,13 +217,6 @@ impl EvidenceReport<'_, '_> {
         let mut all = rows.estimate_parameters(place);
         all.retain(|estimate| !estimate.name.starts_with(DEPARTURE));
         all
-    }
-
-    /// The size of a curve that has no law: its root mean square. No fit tells how well it is known.
-    fn compute_curve_size(&self, name: &str) -> Vec<ParameterEstimate> {
-        let Some((_, x)) = self.answer.contributions.iter().find(|(known, _)| known == name) else { return Vec::new() };
-        let unit = find_output_unit(&self.case.model.output).to_owned();
-        vec![ParameterEstimate { name: "rms".to_owned(), value: rms(x), low: None, high: None, unit }]
     }
 
     /// Share of a contribution's square that the baseline can imitate.

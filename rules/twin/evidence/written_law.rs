@@ -125,7 +125,9 @@ impl EvidenceReport<'_, '_> {
         let mut best = ((1.0 - DEPARTURE_GAIN) * left_out.compute_square(), None);
         for place in self.baseline.parts.len()..fit.parts.len() {
             let part = &fit.parts[place];
-            let Some(own) = part.compute_contribution(&self.case.scene).filter(|_| !is_latent(part)) else { continue };
+            // A state and what a meter does to the whole output know nothing of the cut.
+            let departs = !is_latent(part) && !part.acts_on_output();
+            let Some(own) = part.compute_contribution(&self.case.scene).filter(|_| departs) else { continue };
             for departure in self.list_departures(part, &own) {
                 let last = departure.x.len() - 1;
                 for knot in [0, last] {
