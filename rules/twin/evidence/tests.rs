@@ -85,40 +85,9 @@ fn check_told_is_written(text: &str, model: &str) -> Diagnosis {
     found
 }
 
-/// A level that a pump adds to a power at times that nobody records, beside a noise of 5 W.
-fn record_hidden_pump() -> String {
-    let mut text = String::from("time_s,run,spindle_speed_rpm,total_power_w\n");
-    let mut state = 99_u64;
-    let mut draw = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        f64::from(u32::try_from(state >> 33).unwrap_or(0)) / f64::from(1_u32 << 31)
-    };
-    let mut on = false;
-    for row in 0..RUNS * ROWS {
-        on ^= draw() < 0.02;
-        let speed = 600.0 + 100.0 * f64::from(row % ROWS / 50);
-        let noise = 5.0 * ((0..12).map(|_| draw()).sum::<f64>() - 6.0);
-        let power = 300.0 + 0.2 * speed + if on { 120.0 } else { 0.0 } + noise;
-        writeln!(text, "{row},{},{speed},{power}", row / ROWS).expect("a string takes it");
-    }
-    text
-}
-
-const NO_LOAD: &str = "schema = \"model/1\"\noutput = \"total_power_w\"\n[[effect]]\nkind = \"linear\"\n\
-                       columns = { one = 300.0, spindle_speed_rpm = 0.2 }\n";
-
 #[test]
 fn what_is_told_of_a_friction_is_what_its_file_does() {
     let found = check_told_is_written(&recorded(20.0), MODEL);
     let missing = &found.missing[0];
     assert!(missing.delta_ic.expect("fitted") > 0.0 && missing.probability.expect("named") > 0.5, "{missing:?}");
-}
-
-#[test]
-fn a_pump_that_nobody_records_is_followed_by_its_file_and_not_predictable() {
-    let found = check_told_is_written(&record_hidden_pump(), NO_LOAD);
-    let pump = found.missing.iter().find(|missing| missing.effect == "auxiliary_switch").expect("the pump");
-    assert!(pump.not_predictable.is_some(), "{pump:?}");
-    let fit = found.fit.as_ref().expect("fitted");
-    assert!(fit.held_out_share().expect("held out") < 0.6, "{fit:?}");
 }
