@@ -45,9 +45,12 @@ impl EvidenceReport<'_, '_> {
             return None;
         }
         let on = read_two_level_state(self.inputs, contribution)?;
-        let height: f64 = self.inputs.fitted_rows(false).map(|row| on[row] * contribution[row]).sum();
-        let rows: f64 = self.inputs.fitted_rows(false).map(|row| on[row]).sum();
-        let part = build_latent_part(height / rows)?;
+        let mean = |wanted: bool| {
+            let rows = self.inputs.fitted_rows(false).filter(|row| (on[*row] > 0.5) == wanted);
+            numerics::statistics::mean(&rows.map(|row| contribution[row]).collect::<Vec<_>>())
+        };
+        let level = mean(true) - mean(false);
+        let part = build_latent_part(level)?;
         self.case.scene.set_unrecorded_state(Some(on));
         Some((part, 1.0))
     }
