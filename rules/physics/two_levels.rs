@@ -58,3 +58,41 @@ fn learn_from_row(on: f64, before: Option<f64>, left: f64, levels: TwoLevels) ->
     let (for_on, for_off) = (on * odds, 1.0 - on);
     if for_on + for_off > 0.0 { for_on / (for_on + for_off) } else { on }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use recording::read_csv;
+    use std::collections::BTreeMap;
+    use std::fmt::Write;
+
+    const PUMP: TwoLevels = TwoLevels { step: 100.0, deviation: 5.0, memory: 0.0, dwell_s: 20.0, share: 0.5 };
+
+    fn is_on(row: u32) -> bool {
+        row / 20 % 2 == 1
+    }
+
+    fn predict(rows_from: u32, spoilt: f64) -> Vec<f64> {
+        let mut text = String::from("time_s,total_power_w\n");
+        for row in 0..200_u32 {
+            let left = if is_on(row) { 100.0 } else { 0.0 } + 4.0 * (f64::from(row) * 2.1).sin();
+            writeln!(text, "{row},{}", if row >= rows_from { spoilt } else { left }).expect("a string takes it");
+        }
+        let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
+        let scene = Scene::new(&recording, "total_power_w", &BTreeMap::new()).expect("recorded");
+        predict_on_probability(&scene, scene.recorded_output(), PUMP)
+    }
+
+    #[test]
+    fn a_level_is_known_one_row_after_it_has_changed() {
+        let on = predict(200, 0.0);
+        let known = |row: &u32| (on[*row as usize] > 0.5) == is_on(*row);
+        assert!((1..200).filter(|row| row % 20 != 0).all(|row| known(&row)), "{on:?}");
+        assert!((20..200).step_by(20).all(|row| !known(&row)), "no row knows its own change before it is seen");
+    }
+
+    #[test]
+    fn later_rows_do_not_change_what_was_predicted() {
+        assert_eq!(predict(200, 0.0)[..=150], predict(150, 5000.0)[..=150]);
+    }
+}

@@ -3,7 +3,7 @@
 //! The factor is linear between knots and constant beyond them, so that nothing is said where nothing was seen. At the middle
 //! knot it is one: what is the same everywhere belongs to the size of the law.
 
-use super::channel::read_channel_values;
+use super::channel::{TIME, read_channel_values};
 use super::model::{Parameter, Part};
 use physics::{Entry, Scene};
 
@@ -79,6 +79,19 @@ impl Part {
             }
         }
         Some(Some(factor))
+    }
+
+    /// Keeps what a departure over the time of a recording came to at its end: the clock of another recording starts anew.
+    pub(super) fn hold_departures_over_time(&mut self) {
+        for number in 0..self.departures.len() {
+            let Some(last) = self.list_knot_values(number).last().copied() else { continue };
+            if self.departures[number].over == TIME {
+                let names: Vec<String> =
+                    (0..self.departures[number].x.len()).map(|knot| name_knot(number, knot)).collect();
+                let own = self.parameters.iter_mut().filter(|parameter| names.contains(&parameter.name));
+                own.for_each(|parameter| parameter.value = last);
+            }
+        }
     }
 
     /// Values at the knots of a departure.

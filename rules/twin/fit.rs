@@ -218,7 +218,7 @@ fn search_step_length(
             let parameter = &mut moved[free.part].parameters[free.parameter];
             let (low, high) = parameter.range;
             let mut change = share * step;
-            if parameter.entry == Entry::Shape {
+            if parameter.entry == Entry::Shape && parameter.prior_deviation().is_none() {
                 let narrow = if low.is_finite() && high.is_finite() { 0.02 * (high - low) } else { 0.05 };
                 let most = (SHAPE_STEP * parameter.value.abs()).max(narrow);
                 change = change.clamp(-most, most);

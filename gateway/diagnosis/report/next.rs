@@ -2,8 +2,7 @@
 
 use super::data::Data;
 use super::table::{ColumnHead, render_table_section};
-use super::text::{escape_html, format_fixed, format_number, format_signed, unit_text, with_unit};
-use rules::physics::explain::Language;
+use super::text::{escape_html, format_fixed, format_signed, unit_text, with_unit};
 use rules::twin::diagnosis::{Alternative, Shift};
 use rules::twin::quality::Fault;
 use std::fmt::Write as _;

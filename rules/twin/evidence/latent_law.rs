@@ -14,10 +14,12 @@ const MEMORY_MAX: f64 = 0.95;
 
 /// Rows in which a contribution of two levels is on; `None` where it is none.
 pub(super) fn read_two_level_state(inputs: &RecordingInputs<'_>, contribution: &[f64]) -> Option<Vec<f64>> {
-    let top = inputs.fitted_rows(false).map(|row| contribution[row]).fold(0.0, f64::max);
-    let on: Vec<f64> = contribution.iter().map(|x| f64::from(u8::from(*x > 0.5 * top))).collect();
+    // Found with either sign: what is less while it is off is more while it is on.
+    let top = inputs.fitted_rows(false).map(|row| contribution[row]).fold(f64::NEG_INFINITY, f64::max);
+    let low = inputs.fitted_rows(false).map(|row| contribution[row]).fold(f64::INFINITY, f64::min);
+    let on: Vec<f64> = contribution.iter().map(|x| f64::from(u8::from(*x > 0.5 * (low + top)))).collect();
     let rows = inputs.fitted_rows(false).filter(|row| on[*row] > 0.5).count();
-    (top > 0.0 && rows > 0 && rows < inputs.fitted_rows(false).count()).then_some(on)
+    (top > low && rows > 0 && rows < inputs.fitted_rows(false).count()).then_some(on)
 }
 
 /// The consumer as a part whose level is fitted while its state is known.

@@ -38,6 +38,7 @@ mod report;
 mod resampling;
 mod search;
 mod second_stage;
+mod settled_parameters;
 mod spectral_line;
 mod step_search;
 mod textbook;

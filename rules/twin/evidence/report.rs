@@ -12,7 +12,7 @@ use super::noise::NoiseModel;
 use super::textbook::Textbook;
 use super::thresholds::THRESHOLDS;
 use super::written_model::WrittenModel;
-use crate::departure::Departure;
+use crate::departure::{DEPARTURE, Departure};
 use crate::diagnosis::{
     Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, UNKNOWN, Verdict,
     find_output_unit,
@@ -74,8 +74,15 @@ impl EvidenceReport<'_, '_> {
         let written = self.tell_written_model(&textbook);
         let fits = self.compare_fits(&curve);
         let missing = self.list_missing_effects(&fits, &textbook, written.as_ref());
+        let open = self.list_undetermined_names(&missing);
+        if self.answer.verdict == Verdict::Explained && !open.is_empty() {
+            self.answer.add_unknown_rivals(&open);
+        }
         let alternatives: Vec<Alternative> = self.list_alternatives();
-        let parts = written.map_or_else(|| self.baseline.parts.clone(), |written| written.parts);
+        let parts = match written {
+            Some(written) => written.parts,
+            None => self.refit_baseline().unwrap_or_else(|| self.case.model.parts.clone()),
+        };
         let shift = if missing.is_empty() { Vec::new() } else { self.list_shifts(&parts) };
         let model = Model { parts, ..self.case.model.clone() };
         let withdrawn = self.answer.withdrawn.take();
@@ -186,10 +193,7 @@ impl EvidenceReport<'_, '_> {
             let place = textbook.laws.get(at).copied().flatten().map(|(place, _)| place).filter(|_| written.is_some());
             let fit = textbook.fit.as_ref();
             let own = fit.zip(place).and_then(|(fit, place)| self.measure_own_figures(fit, place));
-            let parameters = match fit.zip(place) {
-                Some((fit, place)) => self.estimate_parameters(fit, place),
-                None => self.compute_curve_size(name),
-            };
+            let parameters = fit.zip(place).map_or_else(Vec::new, |(fit, place)| self.estimate_parameters(fit, place));
             let part = written.zip(place).map(|(written, place)| &written.parts[place]);
             let (statement, equation) = describe_law(name, part);
             let told = place.is_some() || name == UNKNOWN;
@@ -198,7 +202,9 @@ impl EvidenceReport<'_, '_> {
                 statement,
                 equation,
                 parameters,
-                delta_ic: own.map(|own| own.information).or_else(|| (!told).then_some(self.answer.information)),
+                delta_ic: own
+                    .map(|own| own.information)
+                    .or_else(|| (name == UNKNOWN).then_some(self.answer.information)),
                 probability: self.answer.find_probability(name),
                 held_out_rmse_before: own
                     .and_then(|own| own.error_without)
@@ -212,7 +218,7 @@ impl EvidenceReport<'_, '_> {
         all
     }
 
-    fn estimate_parameters(&self, fit: &Fit, place: usize) -> Vec<ParameterEstimate> {
+    pub(super) fn estimate_parameters(&self, fit: &Fit, place: usize) -> Vec<ParameterEstimate> {
         let rows = &self.comparison.rows;
         let rows = FittedRows {
             scene: &self.case.scene,
@@ -223,14 +229,9 @@ impl EvidenceReport<'_, '_> {
             unit: rows.iter().map(|row| self.inputs.unit[*row]).collect(),
             of_model: self.baseline.parts.len(),
         };
-        rows.estimate_parameters(place)
-    }
-
-    /// The size of a curve that has no law: its root mean square. No fit tells how well it is known.
-    fn compute_curve_size(&self, name: &str) -> Vec<ParameterEstimate> {
-        let Some((_, x)) = self.answer.contributions.iter().find(|(known, _)| known == name) else { return Vec::new() };
-        let unit = find_output_unit(&self.case.model.output).to_owned();
-        vec![ParameterEstimate { name: "rms".to_owned(), value: rms(x), low: None, high: None, unit }]
+        let mut all = rows.estimate_parameters(place);
+        all.retain(|estimate| !estimate.name.starts_with(DEPARTURE));
+        all
     }
 
     /// Share of a contribution's square that the baseline can imitate.

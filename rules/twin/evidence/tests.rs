@@ -63,3 +63,31 @@ fn the_same_recording_gives_the_same_answer() {
     let (one, other) = (diagnosed(3.0), diagnosed(3.0));
     assert_eq!((one.rows, one.missing, one.summary), (other.rows, other.missing, other.summary));
 }
+
+/// Every named answer tells what its file does over the same rows, and the file is a model again.
+fn check_told_is_written(text: &str, model: &str) -> Diagnosis {
+    let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
+    let found = diagnose_recording(&recording, &parse_model(model).expect("fine"), 1).expect("usable");
+    let file = parse_model(&crate::write_model(&found.model)).expect("a model again");
+    let rows = crate::simulate::simulate_recording(&recording, &file, false).expect("simulated");
+    assert!(!found.missing.is_empty() && found.missing.iter().all(|m| m.effect != "unknown"), "{}", found.debug);
+    for (told, written) in found.rows.simulated_after.iter().zip(&rows.total) {
+        let (told, written) = (told.expect("told"), written.expect("written"));
+        assert!((told - written).abs() <= 1e-9 * written.abs().max(1.0), "{told} {written}");
+    }
+    let fit = found.fit.as_ref().expect("fitted");
+    let (before, after) = (fit.before.held_out_rmse.expect("held out"), fit.after.held_out_rmse.expect("held out"));
+    let ceiling = fit.ceiling.and_then(|ceiling| ceiling.held_out_rmse).expect("held out");
+    assert!(after < before, "{before} {after}");
+    if found.verdict == Verdict::Explained {
+        assert!(before - after >= 0.8 * (before - ceiling), "{before} {after} {ceiling}");
+    }
+    found
+}
+
+#[test]
+fn what_is_told_of_a_friction_is_what_its_file_does() {
+    let found = check_told_is_written(&recorded(20.0), MODEL);
+    let missing = &found.missing[0];
+    assert!(missing.delta_ic.expect("fitted") > 0.0 && missing.probability.expect("named") > 0.5, "{missing:?}");
+}

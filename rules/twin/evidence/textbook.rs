@@ -45,9 +45,12 @@ impl EvidenceReport<'_, '_> {
             return None;
         }
         let on = read_two_level_state(self.inputs, contribution)?;
-        let height: f64 = self.inputs.fitted_rows(false).map(|row| on[row] * contribution[row]).sum();
-        let rows: f64 = self.inputs.fitted_rows(false).map(|row| on[row]).sum();
-        let part = build_latent_part(height / rows)?;
+        let mean = |wanted: bool| {
+            let rows = self.inputs.fitted_rows(false).filter(|row| (on[*row] > 0.5) == wanted);
+            numerics::statistics::mean(&rows.map(|row| contribution[row]).collect::<Vec<_>>())
+        };
+        let level = mean(true) - mean(false);
+        let part = build_latent_part(level)?;
         self.case.scene.set_unrecorded_state(Some(on));
         Some((part, 1.0))
     }
@@ -173,7 +176,9 @@ pub(super) fn build_candidate(
     let mut part = Part::from_effect(effect, form, names);
     for parameter in &mut part.parameters {
         if let Some(doc) = effect.doc().find_parameter(&parameter.name) {
-            parameter.range = effect.parameter_range(scene, doc);
+            // What a file may hold bounds what is possible for this output.
+            let (low, high) = effect.parameter_range(scene, doc);
+            parameter.range = (low.max(doc.range.0), high.min(doc.range.1));
             parameter.value = parameter.value.clamp(parameter.range.0, parameter.range.1);
         }
     }

@@ -6,7 +6,7 @@ use super::report::EvidenceReport;
 use crate::channel::{SIMULATED_CUT, TIME, read_channel_values};
 use crate::departure::{DEPARTURE_USUAL, Departure};
 use crate::fit::Fit;
-use crate::model::Part;
+use crate::model::{Part, simulate_parts};
 use numerics::linear::columns::dot;
 use numerics::statistics::quantile;
 use physics::Role;
@@ -26,7 +26,8 @@ impl EvidenceReport<'_, '_> {
     pub(super) fn fit_named_laws(&mut self, near: &[(String, Part)]) -> Option<Fit> {
         let first = self.fit_from_starts(near)?;
         let best = self.mend_by_subsets(near, first);
-        Some(self.add_departures(best))
+        let wider = self.add_departures(best);
+        Some(self.settle_parameters(wider))
     }
 
     /// Of the fits from the nearest laws and from the output the one that leaves least of rows left out.
@@ -97,6 +98,10 @@ impl EvidenceReport<'_, '_> {
     fn add_departures(&mut self, fit: Fit) -> Fit {
         let mut best = fit;
         for _ in 0..DEPARTURES_MAX {
+            // The scene holds load and output of whatever was fitted last.
+            if simulate_parts(&best.parts, &mut self.case.scene).is_none() {
+                break;
+            }
             let Some((place, departure)) = self.find_best_departure(&best) else { break };
             let before = self.prepare_left_out(&best).compute_square();
             let mut parts = best.parts.clone();
@@ -120,7 +125,9 @@ impl EvidenceReport<'_, '_> {
         let mut best = ((1.0 - DEPARTURE_GAIN) * left_out.compute_square(), None);
         for place in self.baseline.parts.len()..fit.parts.len() {
             let part = &fit.parts[place];
-            let Some(own) = part.compute_contribution(&self.case.scene).filter(|_| !is_latent(part)) else { continue };
+            // A state and what a meter does to the whole output know nothing of the cut.
+            let departs = !is_latent(part) && !part.acts_on_output();
+            let Some(own) = part.compute_contribution(&self.case.scene).filter(|_| departs) else { continue };
             for departure in self.list_departures(part, &own) {
                 let last = departure.x.len() - 1;
                 for knot in [0, last] {

@@ -44,6 +44,13 @@ impl EvidenceReport<'_, '_> {
         total.iter().all(|x| x.is_finite()).then_some(WrittenModel { parts, total, contributions })
     }
 
+    /// The model's own parts refitted within what is possible; `None` where their file would be refused.
+    pub(super) fn refit_baseline(&mut self) -> Option<Vec<Part>> {
+        let parts = self.baseline.parts.clone();
+        let fit = self.refit_parts(&parts)?;
+        self.write_fit(&fit).map(|written| written.parts)
+    }
+
     /// What each name with a law adds in the file.
     pub(super) fn list_written_contributions(&self, textbook: &Textbook, written: &WrittenModel) -> Vec<Named> {
         let named = self.answer.names.iter().zip(&textbook.laws);

@@ -90,6 +90,7 @@ impl Simulation {
     #[must_use]
     pub fn new(mut model: Model, minutes: CuttingTimes) -> Self {
         model.parts.retain(|part| !OF_THE_PAST.contains(&part.kind.as_str()));
+        model.parts.iter_mut().for_each(Part::hold_departures_over_time);
         let memory = model.parts.iter().map(|part| LookBack::from_kind(&part.kind)).max().unwrap_or(LookBack::Moment);
         Self { model, look_back: memory, window: Window::new(memory, minutes), parts: None, failure: None }
     }
