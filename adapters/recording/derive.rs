@@ -4,8 +4,8 @@ use super::{Cells, Numbers, Recording};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-/// Names this module can derive.
-const DERIVABLE: [&str; 6] = [
+/// Names that can be derived, each after those that it follows from.
+pub const DERIVABLE: [&str; 6] = [
     "feed_per_rev_mm",
     "cutting_speed_m_min",
     "feed_per_tooth_mm",

@@ -6,12 +6,12 @@
 mod derive;
 pub mod read;
 
-pub use derive::{derive_quantity, with_derived};
+pub use derive::{DERIVABLE, derive_quantity, with_derived};
 pub use read::mapping::{ColumnMapping, Mapping, MappingError, TimeMapping};
 pub use read::plan::{Note, NoteKind};
 pub use read::{ReadRecording, RecordingError, RowProblem, read_csv, read_path, read_path_as};
 
-use adapter_core::clock::TimeNs;
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use adapter_core::integer::convert_bounded;
 use std::collections::HashMap;
 
@@ -188,12 +188,22 @@ impl Cells {
     /// The cells of the rows that are kept.
     #[must_use]
     pub(crate) fn select_rows(&self, kept: &[bool]) -> Self {
-        let rows = || (0..kept.len()).filter(|row| kept[*row]);
+        self.take_rows(&(0..kept.len()).filter(|row| kept[*row]).collect::<Vec<_>>())
+    }
+
+    /// The cells of these rows, in this order.
+    fn take_rows(&self, rows: &[usize]) -> Self {
         match self {
-            Self::Numbers(numbers) => Self::Numbers(rows().map(|row| numbers.get(row)).collect()),
-            Self::Words(words) => Self::Words(words.at_rows(rows())),
+            Self::Numbers(numbers) => Self::Numbers(rows.iter().map(|row| numbers.get(*row)).collect()),
+            Self::Words(words) => Self::Words(words.at_rows(rows.iter().copied())),
         }
     }
+}
+
+fn convert_seconds(seconds: f64) -> TimeNs {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "seconds of a recording")]
+    let ns = (seconds * SECOND_NS as f64).round() as TimeNs;
+    ns
 }
 
 /// A column of a recording with its name.
@@ -212,6 +222,23 @@ pub struct Run {
     pub name: String,
     /// Rows of this run.
     pub rows: std::ops::Range<usize>,
+}
+
+/// Rows without the name of a run, one after the other, beyond which they are a stretch of their own.
+const NAMELESS_ROWS_MAX: usize = 3;
+
+/// A few rows without a name belong to the run before them, at the head of a recording to the one after.
+fn bridge_gaps(runs: Vec<Run>) -> Vec<Run> {
+    let is_gap = |run: &Run| run.name.is_empty() && run.rows.len() <= NAMELESS_ROWS_MAX;
+    let mut bridged: Vec<Run> = Vec::with_capacity(runs.len());
+    for run in runs {
+        match bridged.last_mut() {
+            Some(last) if is_gap(&run) || last.name == run.name => last.rows.end = run.rows.end,
+            Some(head) if is_gap(head) => *head = Run { rows: head.rows.start..run.rows.end, name: run.name },
+            _ => bridged.push(run),
+        }
+    }
+    bridged
 }
 
 /// A table of samples over time, all columns of one length.
@@ -273,6 +300,26 @@ impl Recording {
         }
     }
 
+    /// These rows, in this order.
+    #[must_use]
+    pub fn take_rows(&self, rows: &[usize]) -> Self {
+        let columns =
+            self.columns.iter().map(|column| Column { name: column.name.clone(), cells: column.cells.take_rows(rows) });
+        let first_s = rows.first().map_or(0.0, |row| self.time_s[*row]);
+        // Where the time of day is known, seconds count from the first row.
+        let (origin_s, start_ns) = match self.start_ns {
+            Some(start_ns) => (first_s, Some(start_ns + convert_seconds(first_s))),
+            None => (0.0, None),
+        };
+        Self {
+            source: self.source.clone(),
+            time_s: rows.iter().map(|row| self.time_s[*row] - origin_s).collect(),
+            start_ns,
+            columns: columns.collect(),
+            joined: self.joined,
+        }
+    }
+
     /// The columns besides time, in the order of the recording.
     #[must_use]
     pub fn columns(&self) -> &[Column] {
@@ -297,7 +344,8 @@ impl Recording {
         })
     }
 
-    /// Stretches of rows with the same `run`, in order. A run that returns later is a second stretch.
+    /// Stretches of rows with the same `run`, in order. A run that returns later is a second stretch; a cell or a few that are
+    /// empty within a run, at its begin or at its end do not end it.
     #[must_use]
     pub fn list_runs(&self) -> Vec<Run> {
         let words = self.find_words("run");
@@ -309,7 +357,7 @@ impl Recording {
                 _ => runs.push(Run { name: name(row).to_owned(), rows: row..row + 1 }),
             }
         }
-        runs
+        if runs.iter().any(|run| !run.name.is_empty()) { bridge_gaps(runs) } else { runs }
     }
 
     /// Says that this is put together from recordings that do not share a clock.

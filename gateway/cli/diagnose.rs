@@ -4,7 +4,9 @@ use super::lang::{language, localize_text, pick_text};
 use super::{CannotRun, CommandOutcome, CommandResult};
 use crate::diagnosis::context::DiagnosisContext;
 use crate::diagnosis::series::{AlignBy, SimulatedSeries, attach_series, recorded_output, series_model};
-use crate::diagnosis::{DiagnosisOutputs, InputRecordings, read_hypotheses, read_model, read_recordings_as, stretch};
+use crate::diagnosis::{
+    Copies, DiagnosisOutputs, InputRecordings, read_hypotheses, read_model, read_recordings_as, stretch,
+};
 use clap::Args;
 use rules::twin::{self, Diagnosis, Model};
 use std::path::PathBuf;
@@ -86,7 +88,7 @@ fn read_inputs(arguments: &DiagnoseArguments) -> Result<(Model, InputRecordings)
         arguments.model.as_ref().map(|path| read_model(path)).transpose().map_err(|wrong| problems.extend(wrong));
     let hypotheses = arguments.effects_dir.as_ref().map_or(Ok(Vec::new()), |directory| read_hypotheses(directory));
     let hypotheses = hypotheses.map_err(|wrong| problems.extend(wrong));
-    let given = read_recordings_as(&arguments.recording, arguments.map.as_ref());
+    let given = read_recordings_as(&arguments.recording, arguments.map.as_ref(), Copies::CountOnce);
     let given = given.map_err(|wrong| problems.extend(wrong.iter().map(|problem| localize_text(problem).to_owned())));
     let (Ok(model), Ok(hypotheses), Ok(mut given)) = (model, hypotheses, given) else {
         return Err(cannot_use(&problems));

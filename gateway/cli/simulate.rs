@@ -2,7 +2,7 @@
 
 use super::diagnose::cannot_use;
 use super::{CannotRun, CommandOutcome, CommandResult};
-use crate::diagnosis::{execute, read_model, read_recordings, simulation, write_output};
+use crate::diagnosis::{Copies, execute, read_model, read_recordings, simulation, write_output};
 use adapters::address::{Address, Target};
 use adapters::simulated::SimulatedSettings;
 use clap::Args;
@@ -57,7 +57,7 @@ pub(super) fn run_simulation(arguments: SimulateArguments) -> CommandResult {
 fn simulate_model(path: &Path, arguments: &SimulateArguments) -> CommandResult {
     let mut problems = Vec::new();
     let model = read_model(path).map_err(|wrong| problems.extend(wrong));
-    let given = read_recordings(&arguments.recording).map_err(|wrong| problems.extend(wrong));
+    let given = read_recordings(&arguments.recording, Copies::Keep).map_err(|wrong| problems.extend(wrong));
     let (Ok(model), Ok(given)) = (model, given) else { return Err(cannot_use(&problems)) };
     given.warnings.iter().for_each(|warning| eprintln!("{warning}"));
     let simulation = simulation::run(&given.recording, &model).map_err(|all| cannot_use(&all))?;
@@ -73,7 +73,7 @@ fn simulate_experiment(machine: &str, arguments: &SimulateArguments) -> CommandR
     let mut problems = Vec::new();
     let settings = parse_machine(machine).map_err(|wrong| problems.push(wrong));
     let plan: Vec<String> = arguments.plan.iter().cloned().collect();
-    let given = read_recordings(&plan).map_err(|wrong| problems.extend(wrong));
+    let given = read_recordings(&plan, Copies::Keep).map_err(|wrong| problems.extend(wrong));
     let (Ok(settings), Ok(given)) = (settings, given) else { return Err(cannot_use(&problems)) };
     let (recording, instruments) = execute::execute_plan(settings, &given.recording, arguments.rate)
         .map_err(|wrong| cannot_use(&[wrong.to_string()]))?;

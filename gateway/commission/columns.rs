@@ -152,7 +152,7 @@ pub enum TorqueFileError {
 /// # Errors
 /// What is wrong with the file.
 pub fn torque_course(file: &Path) -> Result<Vec<(f64, f64)>, TorqueFileError> {
-    let read = gateway_diagnosis::read_recordings(&[file.display().to_string()])
+    let read = gateway_diagnosis::read_recordings(&[file.display().to_string()], gateway_diagnosis::Copies::Keep)
         .map_err(|problems| TorqueFileError::Unreadable(problems.join("\n")))?;
     let torque =
         read.recording.find_numbers("torque_nm").ok_or_else(|| TorqueFileError::NoTorque { file: file.to_owned() })?;

@@ -6,6 +6,7 @@
 
 use super::beside::{BesideModel, Onset, beside_model, compose_headline};
 use super::context::DiagnosisContext;
+use super::order::Copies;
 use super::recordings::read_recordings_as;
 use super::series::{AlignBy, SimulatedSeries, attach_series, recorded_output, series_model};
 use super::store::DiagnosisStore;
@@ -177,7 +178,7 @@ fn read_input(job: &DiagnosisJob) -> Result<Compared, String> {
             let together =
                 |all: Vec<Bilingual>| all.into_iter().map(|problem| problem.en).collect::<Vec<_>>().join("; ");
             let mut model = Some(job.toml.as_str()).filter(|toml| !toml.is_empty()).map(parsed).transpose()?;
-            let given = read_recordings_as(&[path.display().to_string()], None).map_err(together)?;
+            let given = read_recordings_as(&[path.display().to_string()], None, Copies::CountOnce).map_err(together)?;
             let (mut recording, mut reading) = (given.recording, given.warnings);
             if let Some(text) = simulated {
                 let series = SimulatedSeries::from_text(text, AlignBy::Auto);

@@ -70,7 +70,9 @@ impl FileDiagnoses {
         let directory = data_dir.join("recordings");
         let (requests, asked) = sync_channel(1);
         let kept = DiagnosisStore::from_directory(directory.join("diagnoses"));
-        let handle = DiagnosisHandle::new(requests, directory.join("model.toml"), kept);
+        // No machine runs beside a file: neither its model nor its history are there.
+        let (model, history) = (directory.join("model.toml"), directory.join("history.db"));
+        let handle = DiagnosisHandle::new(requests, model, history, kept);
         let own = Self { directory, handle };
         let (index, kept) = (own.index(), own.handle.diagnosis_store().clone());
         // The thread holds no handle that could ask: it ends when the last one outside is gone.

@@ -3,19 +3,28 @@
 
 use super::beside::Onset;
 use super::child::Stage;
-use super::store::{DiagnosisFile, DiagnosisStore};
+use super::store::DiagnosisStore;
+use super::stretch;
 use super::worker::{ChildFailure, DiagnosisRequest, LoadedModel};
-use adapter_core::clock::TimeNs;
+use adapter_core::bilingual::Bilingual;
+use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_base::files::{read_text, replace_durably};
-use rules::twin::parse_model;
+use gateway_history::Reader;
+use recording::Recording;
+use rules::twin::{live, parse_model};
 use std::path::{Path, PathBuf};
 use std::process::Child;
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// The longest model file that is read.
 const MODEL_MAX: usize = 4 << 20;
+
+/// So much of the history tells what a machine delivers: long enough for a cut between two breaks.
+const RECENT_NS: i64 = 2 * 3600 * SECOND_NS;
+/// And so long that is believed.
+const RECENT_FOR: Duration = Duration::from_secs(60);
 
 /// What is being done, or was done last.
 #[derive(Debug, Clone, Default)]
@@ -91,6 +100,8 @@ struct DiagnosisState {
     onsets: Vec<Onset>,
     /// Seconds per row of the last one: from these follows about how long the next one takes.
     pace_s: Option<f64>,
+    /// What the machine has delivered lately, and when it was read.
+    recent: Option<(Instant, Arc<Recording>)>,
 }
 
 /// See the [module](self). Clones are handles of the same diagnoses.
@@ -99,14 +110,15 @@ pub struct DiagnosisHandle {
     state: Arc<Mutex<DiagnosisState>>,
     requests: SyncSender<DiagnosisRequest>,
     model: PathBuf,
+    history: PathBuf,
     store: DiagnosisStore,
 }
 
 impl DiagnosisHandle {
-    /// A handle whose requests go there.
+    /// A handle whose requests go there; what the machine delivers is read from the history at that path.
     #[must_use]
-    pub fn new(requests: SyncSender<DiagnosisRequest>, model: PathBuf, kept: DiagnosisStore) -> Self {
-        Self { state: Arc::default(), requests, model, store: kept }
+    pub fn new(requests: SyncSender<DiagnosisRequest>, model: PathBuf, history: PathBuf, kept: DiagnosisStore) -> Self {
+        Self { state: Arc::default(), requests, model, history, store: kept }
     }
 
     /// A handle of the same diagnoses that asks for none: its thread ends when the others are gone.
@@ -254,22 +266,78 @@ impl DiagnosisHandle {
         };
     }
 
+    /// Why the machine cannot be compared with this model while it works; `None` where it can, and where nothing is stored that
+    /// would tell.
+    #[must_use]
+    pub fn find_live_refusal(&self, toml: &str) -> Option<Bilingual> {
+        let recent = self.read_recent()?;
+        let unfed = live::list_unfed_inputs(&parse_model(toml).ok()?, &recent);
+        (!unfed.is_empty()).then(|| {
+            let needs = unfed.join("; ");
+            Bilingual::new(
+                format!("The running machine cannot feed this model: {needs}. Use it for recordings, not for the live comparison."),
+                format!("运行中的机床无法为该模型提供输入：{needs}。可用于记录文件，不能用于实时对照。"),
+            )
+        })
+    }
+
+    /// What the machine has delivered lately; read anew after a while.
+    fn read_recent(&self) -> Option<Arc<Recording>> {
+        let known = self.lock().recent.clone().filter(|(since, _)| since.elapsed() < RECENT_FOR);
+        if let Some((_, recent)) = known {
+            return Some(recent);
+        }
+        let (_, newest_ns) = Reader::open(&self.history).ok()?.read_span().ok()??;
+        let output = self.lock().model.as_ref()?.model.output.clone();
+        let recent = stretch::read(&self.history, newest_ns - RECENT_NS, newest_ns, &output).ok()?;
+        // A machine that was off all the time tells nothing of what it delivers.
+        recent.find_numbers(&output).filter(|numbers| numbers.count_present() > 0)?;
+        let recent = Arc::new(recent);
+        self.lock().recent = Some((Instant::now(), Arc::clone(&recent)));
+        Some(recent)
+    }
+
+    fn path_before(&self) -> PathBuf {
+        self.model.with_extension("before.toml")
+    }
+
+    /// The name of the model that was in charge before the last one was taken over; `None` where none is kept.
+    #[must_use]
+    pub fn model_before(&self) -> Option<String> {
+        parse_model(&read_text(&self.path_before(), MODEL_MAX).ok()?).ok().map(|model| model.name)
+    }
+
     /// Puts the model of a diagnosis in the place of the one in charge; the one before is kept beside it. Gives what was done, in
     /// words. The box notices the file within two seconds.
     ///
     /// # Errors
-    /// The diagnosis has no model, the file has been changed since, or it cannot be written.
-    pub fn accept_model(&self, key: &str) -> Result<String, DiagnosisRefusal> {
-        let gone = || {
-            DiagnosisRefusal::new(
-                "this diagnosis has left no model",
-                "only one that names what is missing does; diagnose again",
-            )
-        };
-        let text = self.store.read_file(key, DiagnosisFile::Model).ok_or_else(gone)?;
+    /// The model cannot be used or fed, the file has been changed since, or it cannot be written.
+    pub fn accept_model(&self, key: &str, text: &str) -> Result<String, DiagnosisRefusal> {
+        if let Some(refusal) = self.find_live_refusal(text) {
+            return Err(DiagnosisRefusal::new(
+                refusal.en,
+                "download the model, and use it with `diagnose` and `simulate`",
+            ));
+        }
+        self.replace_model(text, &format!("of diagnosis {key}"))
+    }
+
+    /// Puts the model that was in charge before back in its place; the one that goes is kept in turn, so that a second call undoes
+    /// the first. Gives what was done, in words.
+    ///
+    /// # Errors
+    /// None is kept, the file has been changed since, or it cannot be written.
+    pub fn restore_model(&self) -> Result<String, DiagnosisRefusal> {
+        let none =
+            |_| DiagnosisRefusal::new("no model from before is kept", "one is kept as soon as a model is taken over");
+        let text = read_text(&self.path_before(), MODEL_MAX).map_err(none)?;
+        self.replace_model(&text, "from before")
+    }
+
+    fn replace_model(&self, text: &str, origin: &str) -> Result<String, DiagnosisRefusal> {
         let next = "look at the file; `cnc-gateway diagnose --accept` writes one by hand";
         let model =
-            parse_model(&text).map_err(|wrong| DiagnosisRefusal::new(format!("the kept model: {}", wrong[0]), next))?;
+            parse_model(text).map_err(|wrong| DiagnosisRefusal::new(format!("the kept model: {}", wrong[0]), next))?;
         let before = self.lock().model.clone();
         let now = read_text(&self.model, MODEL_MAX).unwrap_or_default();
         if before.as_ref().is_some_and(|before| before.toml != now) {
@@ -279,14 +347,13 @@ impl DiagnosisHandle {
         let permission = "the user of the gateway must be allowed to write the file of [twin] model";
         let cannot =
             |error: std::io::Error| DiagnosisRefusal::new(format!("{}: {error}", self.model.display()), permission);
-        let kept_before = self.model.with_extension("before.toml");
-        replace_durably(&kept_before, &now).map_err(cannot)?;
-        replace_durably(&self.model, &text).map_err(cannot)?;
+        replace_durably(&self.path_before(), &now).map_err(cannot)?;
+        replace_durably(&self.model, text).map_err(cannot)?;
         let before = before.map_or_else(|| "none".to_owned(), |before| before.model.name);
         Ok(format!(
-            "model {:?} of diagnosis {key} in the place of {before:?}; the one before is in {}",
+            "model {:?} {origin} in the place of {before:?}; the one that was in charge is in {}",
             model.name,
-            kept_before.display()
+            self.path_before().display()
         ))
     }
 }

@@ -12,6 +12,7 @@ mod join;
 pub mod map_file;
 pub mod model_new;
 mod models;
+mod order;
 mod outputs;
 mod recordings;
 pub mod report;
@@ -28,5 +29,6 @@ pub mod worker;
 
 pub use join::{JoinError, join_recordings};
 pub use models::{read_hypotheses, read_model};
+pub use order::Copies;
 pub use outputs::{DiagnosisOutputs, write_output};
 pub use recordings::{InputRecordings, describe_reading, read_recordings, read_recordings_as};

@@ -1,5 +1,6 @@
 //! The recordings that a command is given: a file of any kind that people have, or a range of a history, read and put together.
 
+use super::order::{Copies, compare_names, order_recordings};
 use super::{history, join_recordings};
 use adapter_core::bilingual::Bilingual;
 use recording::Recording;
@@ -24,23 +25,31 @@ pub struct InputRecordings {
     pub warnings: Vec<Bilingual>,
 }
 
-/// Reads every recording and puts them together in the order given. A file is read under the map that lies beside it, if there is one.
+/// Reads every recording and puts them together in the order of time. A file is read under the map that lies beside it, if there is one.
 ///
 /// # Errors
 /// Everything that makes any of them unusable, at once.
-pub fn read_recordings(sources: &[String]) -> Result<InputRecordings, Vec<String>> {
-    read_recordings_as(sources, None).map_err(|problems| problems.into_iter().map(|problem| problem.en).collect())
+pub fn read_recordings(sources: &[String], copies: Copies) -> Result<InputRecordings, Vec<String>> {
+    read_recordings_as(sources, None, copies)
+        .map_err(|problems| problems.into_iter().map(|problem| problem.en).collect())
 }
 
 /// The same, each file under this map where one is given.
 ///
 /// # Errors
 /// Everything that makes any of them unusable, at once, in both languages.
-pub fn read_recordings_as(sources: &[String], map: Option<&PathBuf>) -> Result<InputRecordings, Vec<Bilingual>> {
+pub fn read_recordings_as(
+    sources: &[String],
+    map: Option<&PathBuf>,
+    copies: Copies,
+) -> Result<InputRecordings, Vec<Bilingual>> {
     let mapping = map.map(|path| Mapping::read(path)).transpose();
     let mapping = mapping.map_err(|wrong| vec![Bilingual::new(wrong.to_string(), wrong.to_string())])?;
     let mut problems = Vec::new();
     let mut read = Vec::new();
+    let mut sources: Vec<&String> = sources.iter().collect();
+    // The words about them are the same for every order in which they are named.
+    sources.sort_by(|a, b| compare_names(a, b));
     for source in sources {
         match read_one(source, mapping.as_ref()) {
             Ok(one) => read.push((source, one)),
@@ -59,8 +68,9 @@ pub fn read_recordings_as(sources: &[String], map: Option<&PathBuf>) -> Result<I
     }
     let refused = read.iter().map(|(_, one)| gateway_base::convert::clamp_to_length(one.refused)).sum();
     let refused_column = read.iter().find_map(|(_, one)| one.problems.first()?.column.clone());
-    let recordings = read.into_iter().map(|(_, one)| one.recording).collect();
-    let recording = join_recordings(recordings)
+    let ordered = order_recordings(read.into_iter().map(|(_, one)| one.recording).collect(), copies);
+    warnings.extend(ordered.remarks);
+    let recording = join_recordings(ordered.recordings)
         .map_err(|problem| vec![Bilingual::new(problem.to_string(), problem.to_string())])?;
     Ok(InputRecordings { recording, refused, refused_column, warnings })
 }

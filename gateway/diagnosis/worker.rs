@@ -139,7 +139,8 @@ impl Worker {
         let (requests, asked) = sync_channel(1);
         let (send, reports) = sync_channel(8);
         let file = FileWatch { path: places.model.clone(), rest: Rest::new(), known };
-        let diagnoses = DiagnosisHandle::new(requests, places.model.clone(), places.kept.clone());
+        let diagnoses =
+            DiagnosisHandle::new(requests, places.model.clone(), places.history.clone(), places.kept.clone());
         let going_on = Arc::new(());
         let (own, still) = (diagnoses.clone(), Arc::downgrade(&going_on));
         let body = move || run_worker(file, &places, (&asked, &own), &send, &still);

@@ -17,7 +17,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{delete, get, post};
 use gateway_access::Role;
 use gateway_diagnosis::handle::{DiagnosisHandle, DiagnosisRefusal, Run};
-use gateway_diagnosis::store::{DiagnosisFile, is_key};
+use gateway_diagnosis::store::{DiagnosisFile, DiagnosisStore, is_key};
 use rules::physics::explain::Language;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -35,6 +35,7 @@ pub(super) const ROUTES: &[Route] = &[
     Route::read("/api/v1/diagnoses/{key}/plan", || get(serve_plan)),
     Route::read("/api/v1/diagnoses/{key}/model", || get(serve_model)),
     Route::post(Role::Setter, "/api/v1/twin/model", BYTES_MAX, || post(accept_model)),
+    Route::delete(Role::Setter, "/api/v1/twin/model", 0, || delete(restore_model)),
 ];
 
 /// The stretch to be diagnosed, as everywhere in the API: `2026-01-31T08:00:00Z`, or `-2h` before the newest sample.
@@ -186,14 +187,31 @@ pub(super) fn respond_with_download(kind: &'static str, name: &str, content: imp
     ([(header::CONTENT_TYPE, kind.to_owned()), (header::CONTENT_DISPOSITION, disposition)], content).into_response()
 }
 
-/// `POST /api/v1/twin/model`: the model of a diagnosis takes the place of the one in charge.
+/// `POST /api/v1/twin/model`: the model of a diagnosis, of the history or of a file, takes the place of the one in charge.
 async fn accept_model(
     State(shared): State<ServerState>,
     SignedIn(_): SignedIn,
     JsonBody(Accepted { key }): JsonBody<Accepted>,
 ) -> Result<Response, ApiProblem> {
     let diagnoses = shared.require_diagnoses()?.clone();
-    let done =
-        super::rules::run_blocking(move || diagnoses.accept_model(&key).map_err(describe_diagnosis_refusal)).await?;
+    let text = read_kept_file(shared, key.clone(), DiagnosisFile::Model).await?;
+    let accepted = move || diagnoses.accept_model(&key, &text).map_err(describe_diagnosis_refusal);
+    respond_with_order(super::rules::run_blocking(accepted).await?)
+}
+
+/// `DELETE /api/v1/twin/model`: the model that was in charge before takes its place again.
+async fn restore_model(State(shared): State<ServerState>, SignedIn(_): SignedIn) -> Result<Response, ApiProblem> {
+    let diagnoses = shared.require_diagnoses()?.clone();
+    let restored = move || diagnoses.restore_model().map_err(describe_diagnosis_refusal);
+    respond_with_order(super::rules::run_blocking(restored).await?)
+}
+
+fn respond_with_order(done: String) -> Result<Response, ApiProblem> {
     Ok(with_audit_note(Json(json!({ "schema": "order/1", "done": true, "text": done })), done))
+}
+
+/// Why the live comparison cannot have the model of a diagnosis, in both languages; null where it can, or where there is none.
+pub(super) fn describe_live_refusal(live: Option<&DiagnosisHandle>, kept: &DiagnosisStore, key: &str) -> Value {
+    let refusal = live.and_then(|live| live.find_live_refusal(&kept.read_file(key, DiagnosisFile::Model)?));
+    refusal.map_or(Value::Null, |it| json!({ "en": it.en, "zh": it.zh }))
 }

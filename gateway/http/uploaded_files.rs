@@ -1,7 +1,7 @@
 //! Files that a person brings to the page: how each is understood, its map, its diagnosis, and three examples whose truth is told afterwards.
 
 use super::ServerState;
-use super::diagnoses::run_document;
+use super::diagnoses::{describe_live_refusal, run_document};
 use super::guard::with_audit_note;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
@@ -21,6 +21,7 @@ use axum::response::Response;
 use axum::routing::{delete, get, post, put};
 use gateway_access::Role;
 use gateway_diagnosis::files::{BroughtFile, FileDiagnoses, FileDiagnosis};
+use gateway_diagnosis::handle::DiagnosisHandle;
 use gateway_diagnosis::map_file::{MapProposal, ProposedColumn};
 use gateway_diagnosis::model_new::{KINDS, MATERIALS, ModelKind, NewModel};
 use rules::twin::format_toml_text;
@@ -64,6 +65,7 @@ fn bilingual_to_json(text: &Bilingual) -> Value {
 /// `GET /api/v1/files`: what was brought, what was found, and what can be chosen.
 async fn serve_files(State(shared): State<ServerState>) -> Result<Json<Value>, ApiProblem> {
     let files = shared.require_files()?.clone();
+    let live = shared.diagnoses.clone();
     run_blocking(move || {
         let kinds: Vec<Value> =
             KINDS.iter().map(|(_, word, en, zh)| json!({ "kind": word, "en": en, "zh": zh })).collect();
@@ -72,7 +74,7 @@ async fn serve_files(State(shared): State<ServerState>) -> Result<Json<Value>, A
             .iter()
             .map(|channel| json!({ "name": channel.name, "unit": channel.unit, "en": channel.en, "zh": channel.zh }))
             .collect();
-        let results: Vec<Value> = files.list_results().iter().map(|result| result_document(&files, result)).collect();
+        let results: Vec<Value> = files.list_results().iter().map(|result| result_document(&files, live.as_ref(), result)).collect();
         let examples: Vec<Value> =
             gallery::EXAMPLES.iter().map(|it| json!({ "name": it.name, "en": it.en, "zh": it.zh })).collect();
         Ok(Json(json!({
@@ -83,18 +85,16 @@ async fn serve_files(State(shared): State<ServerState>) -> Result<Json<Value>, A
     .await
 }
 
-fn result_document(files: &FileDiagnoses, result: &FileDiagnosis) -> Value {
-    let words = files.handle().diagnosis_store().read_texts(&result.key).unwrap_or_default();
-    let has_model = files
-        .handle()
-        .diagnosis_store()
-        .read_file(&result.key, gateway_diagnosis::store::DiagnosisFile::Model)
-        .is_some();
+fn result_document(files: &FileDiagnoses, live: Option<&DiagnosisHandle>, result: &FileDiagnosis) -> Value {
+    let kept = files.handle().diagnosis_store();
+    let words = kept.read_texts(&result.key).unwrap_or_default();
+    let has_model = kept.read_file(&result.key, gateway_diagnosis::store::DiagnosisFile::Model).is_some();
     json!({
         "key": result.key, "file": result.file, "by": result.by, "at_ms": result.at_ms, "from_ms": result.at_ms, "to_ms": result.at_ms,
         "verdict": result.verdict, "summary": result.summary, "summary_zh": words.summary_zh, "missing": result.missing,
         "diagnosis": result.diagnosis, "steps": words.steps, "minutes": words.minutes, "effects": words.effects,
-        "page": format!("/api/v1/diagnoses/{}/page", result.key), "model": has_model, "truth": gallery::of_file(&result.file),
+        "page": format!("/api/v1/diagnoses/{}/page", result.key), "model": has_model,
+        "refused": describe_live_refusal(live, kept, &result.key), "truth": gallery::of_file(&result.file),
     })
 }
 

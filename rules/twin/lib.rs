@@ -35,6 +35,8 @@ pub mod plan;
 mod prepared_recording;
 pub mod quality;
 pub mod region;
+#[cfg(test)]
+mod robustness;
 pub mod speed_table;
 pub mod summary;
 pub mod term;

@@ -35,8 +35,10 @@ impl<'a> Case<'a> {
         let Some(nominal) = simulate_parts(&parts, &mut scene) else {
             return Err(vec!["the model cannot be simulated over this recording".to_owned()]);
         };
-        super::inputs::exclude_rows_without_inputs(&mut scene, &parts);
-        let faults = exclude_faulty_rows(&mut scene, &nominal.total);
+        let measured = scene.usable_rows().to_vec();
+        let filled = super::inputs::exclude_rows_without_inputs(&mut scene, &parts);
+        let mut faults = exclude_faulty_rows(&mut scene, &nominal.total, &measured);
+        faults.extend(filled);
         let units = list_units(&scene);
         let held = select_held_out_units(&scene, &units, seed);
         Ok(Self { model, scene, parts, units, held, faults })

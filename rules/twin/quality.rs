@@ -28,6 +28,8 @@ pub enum FaultKind {
     DuplicateTime,
     /// Rows that could not be read.
     RefusedRows,
+    /// Rows in which an input has no value: one was filled in, and the rows do not count.
+    FilledInputs,
 }
 
 impl FaultKind {
@@ -40,6 +42,8 @@ impl FaultKind {
             Self::Quantisation => "quantisation",
             Self::DuplicateTime => "duplicate_time",
             Self::RefusedRows => "refused_rows",
+            // To the contract an input without a value is a dropout of its column.
+            Self::FilledInputs => "dropouts",
         }
     }
 
@@ -52,6 +56,7 @@ impl FaultKind {
             Self::Quantisation => ("recorded in coarse steps", "量化步长较粗"),
             Self::DuplicateTime => ("time stands still or runs backwards", "时间停滞或倒退"),
             Self::RefusedRows => ("rows refused while reading", "读取时被拒绝的行"),
+            Self::FilledInputs => ("input without a value, not compared", "输入无值，未参与比较"),
         };
         language.select_text(en, zh)
     }
@@ -64,8 +69,9 @@ const SPIKE_DEVIATIONS: f64 = 8.0;
 /// Identical values in a row that count as a held dropout, where identical neighbours are rare.
 const HELD_ROWS: usize = 4;
 
-/// Notes faults and takes their rows out of the scene. `simulated` is the baseline's output.
-pub fn exclude_faulty_rows(scene: &mut Scene, simulated: &[f64]) -> Vec<Fault> {
+/// Notes faults and takes their rows out of the scene. `simulated` is the baseline's output, `measured` the rows with a value of
+/// the output: others may have been taken out for their inputs.
+pub fn exclude_faulty_rows(scene: &mut Scene, simulated: &[f64], measured: &[bool]) -> Vec<Fault> {
     let mut faults = Vec::new();
     let output = scene.output_name().to_owned();
     let mut note = |kind: FaultKind, column: &str, rows: usize| {
@@ -74,8 +80,9 @@ pub fn exclude_faulty_rows(scene: &mut Scene, simulated: &[f64]) -> Vec<Fault> {
         }
     };
     note(FaultKind::DuplicateTime, "time_s", count_duplicate_times(scene));
+    scene.exclude_rows(find_repeated_rows(scene));
     note(FaultKind::Quantisation, &output, count_quantised_rows(scene));
-    let mut dropped = find_absent_rows(scene);
+    let mut dropped: Vec<usize> = (0..scene.rows()).filter(|row| !measured[*row]).collect();
     let held = find_held_rows(scene, &mark_rows_at_limit(scene));
     let zeros = find_zero_rows(scene, simulated);
     dropped.extend(held.iter().chain(&zeros));
@@ -89,15 +96,18 @@ pub fn exclude_faulty_rows(scene: &mut Scene, simulated: &[f64]) -> Vec<Fault> {
     faults
 }
 
+/// Rows of the time and the output of the row before them: one measurement that was written twice counts once.
+fn find_repeated_rows(scene: &Scene) -> Vec<usize> {
+    let (time_s, recorded) = (scene.time_s(), scene.recorded_output());
+    let is_repeated = |row: &usize| time_s[*row] == time_s[row - 1] && recorded[*row] == recorded[row - 1];
+    scene.runs().iter().flat_map(|run| (run.start + 1..run.end).filter(is_repeated).collect::<Vec<_>>()).collect()
+}
+
 fn count_duplicate_times(scene: &Scene) -> usize {
     let time_s = scene.time_s();
     let same =
         |rows: &std::ops::Range<usize>| time_s[rows.clone()].windows(2).filter(|pair| pair[0] >= pair[1]).count();
     scene.runs().iter().map(same).sum()
-}
-
-fn find_absent_rows(scene: &Scene) -> Vec<usize> {
-    (0..scene.rows()).filter(|row| !scene.usable_rows()[*row]).collect()
 }
 
 /// Rows in which the output stands at the end of its range again and again: for several rows at a time, more than once,
@@ -227,8 +237,8 @@ mod tests {
 
     fn dropped(brim: f64, asleep: std::ops::Range<u32>) -> usize {
         let mut scene = scene(brim, asleep);
-        let simulated = vec![1.0; scene.rows()];
-        exclude_faulty_rows(&mut scene, &simulated)
+        let (simulated, measured) = (vec![1.0; scene.rows()], scene.usable_rows().to_vec());
+        exclude_faulty_rows(&mut scene, &simulated, &measured)
             .iter()
             .filter(|fault| fault.kind == FaultKind::Dropouts)
             .map(|fault| fault.rows)

@@ -11,7 +11,7 @@ mod tool_wear;
 
 use super::diagnose::cannot_use;
 use super::{CannotRun, CommandOutcome, CommandResult, load_configuration, print_json, print_text};
-use crate::diagnosis::{read_recordings, write_output};
+use crate::diagnosis::{Copies, read_recordings, write_output};
 use crate::identification;
 use adapters::Recording;
 use clap::{Args, Subcommand};
@@ -96,7 +96,7 @@ struct IdentifyOutput {
 impl IdentifyFiles {
     /// The recordings, put together; rows that were refused are told on standard error.
     fn read(&self) -> Result<Recording, CannotRun> {
-        let given = read_recordings(&self.recording).map_err(|problems| cannot_use(&problems))?;
+        let given = read_recordings(&self.recording, Copies::CountOnce).map_err(|problems| cannot_use(&problems))?;
         given.warnings.iter().for_each(|warning| eprintln!("{warning}"));
         Ok(given.recording)
     }

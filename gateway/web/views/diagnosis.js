@@ -6,6 +6,8 @@ import { language, own, t } from "/web/words.js";
 
 const SPANS_H = [1, 2, 4, 8];
 const STAGES = ["waiting", "reading", "comparing", "writing"];
+/** Steps of an experiment that stand open; the others unfold. */
+const STEPS_IN_SIGHT = 5;
 /** Of a longer time the beginning is left out: 28,800 rows of a second. */
 const LONGEST_H = 8;
 
@@ -263,14 +265,24 @@ function experiment(found, d, done) {
     : t("experiment");
   const list = steps.length ? steps : [statement];
   const tick = list.map((text, at) => step(`${found.key}#${at}`, text, done));
-  return [
-    make("h3", "", title),
-    statement && steps.length ? make("p", "", statement) : null,
+  const listed = (all, start) =>
     make(
       "ol",
       "steps",
-      tick.map((it) => make("li", "", it)),
-    ),
+      all.map((it) => make("li", "", it)),
+      { start },
+    );
+  const rest = tick.slice(STEPS_IN_SIGHT);
+  return [
+    make("h3", "", title),
+    statement && steps.length ? make("p", "", statement) : null,
+    listed(tick.slice(0, STEPS_IN_SIGHT), 1),
+    rest.length
+      ? make("details", "", [
+          make("summary", "", t("more_steps", rest.length)),
+          listed(rest, STEPS_IN_SIGHT + 1),
+        ])
+      : null,
   ].filter(Boolean);
 }
 
@@ -280,7 +292,9 @@ function buttons(found, context) {
   const all = [];
   if (found.page) all.push(link(report(found), t("open_report"), { target: "_blank", rel: "noopener" }));
   if (found.steps?.length) all.push(link(`/api/v1/diagnoses/${found.key}/plan?lang=${language()}`, t("plan_csv")));
-  if (found.model) {
+  if (found.model) all.push(link(`/api/v1/diagnoses/${found.key}/model`, t("download_model")));
+  // What the machine cannot feed is refused here, with the reason, and not after a click.
+  if (found.model && context.status()?.twin && !found.refused) {
     const accept = make("button", "", t("accept_model"), {
       type: "button",
       onclick: () => confirmed(accept, found, note),
@@ -288,7 +302,8 @@ function buttons(found, context) {
     accept.disabled = !context.session?.may?.edit;
     all.push(accept);
   }
-  return make("div", "buttons", [...all, note]);
+  const refused = found.model && found.refused ? [make("p", "warn-text", own(found.refused))] : [];
+  return make("div", "", [...refused, make("div", "buttons", [...all, note])]);
 }
 
 /** Once more: what is watched from now on is learned anew. */
@@ -322,6 +337,26 @@ function confirmed(button, found, note) {
   });
   document.body.append(dialog);
   dialog.showModal();
+}
+
+/** Where a model was taken over: the one before it takes its place again, with one click. */
+export function drawModelBefore(place, name, context, changed) {
+  const note = make("span", "note", "", { role: "status" });
+  const back = make("button", "", t("restore_model"), {
+    type: "button",
+    onclick: async () => {
+      back.disabled = true;
+      try {
+        await ask("/api/v1/twin/model", { method: "DELETE" });
+        say(note, t("accepted"));
+        setTimeout(changed, 2500);
+      } catch (error) {
+        say(note, error.message);
+      }
+    },
+  });
+  back.disabled = !context.session?.may?.edit;
+  fill(place, name ? [make("span", "note", t("model_before", name)), back, note] : []);
 }
 
 /** A step to tick off; what is ticked is remembered by this browser. */

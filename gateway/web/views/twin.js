@@ -6,7 +6,7 @@ import { box, own, t } from "/web/words.js";
 import { TimePlot, drawnFrom } from "/web/plot.js";
 import { columns } from "/web/history-data.js";
 import { Brought } from "/web/brought.js";
-import { Asking, drawDiagnoses, ticked } from "/web/diagnosis.js";
+import { Asking, drawDiagnoses, drawModelBefore, ticked } from "/web/diagnosis.js";
 
 const SPANS = [3600, 6 * 3600, 86400, 7 * 86400];
 
@@ -14,6 +14,7 @@ export function mount(root, context) {
   const state = { span: 3600, read: 0, plots: [], done: ticked() };
   const verdict = make("p", "verdict", " ");
   const facts = make("div", "");
+  const before = make("div", "buttons");
   const regimes = make("div", "");
   const figure = make("div", "plot-box");
   const left = make("div", "plot-box");
@@ -42,7 +43,7 @@ export function mount(root, context) {
   const asking = new Asking(context, () => setTimeout(() => read(), 1500));
   const brought = new Brought(context);
   root.append(
-    make("div", "columns", [card(t("twin_now"), [verdict, facts], "ages"), card(t("twin_watched"), regimes, "ages")]),
+    make("div", "columns", [card(t("twin_now"), [verdict, facts, before], "ages"), card(t("twin_watched"), regimes, "ages")]),
     card("", [
       make("div", "head", [make("h2", "", t("twin_figure")), ranges]),
       make(
@@ -72,6 +73,7 @@ export function mount(root, context) {
     if (!status) return;
     const twin = await ask("/api/v1/twin?limit=20").catch(() => ({ diagnoses: [] }));
     drawDiagnoses(latest, past, twin.diagnoses, context, state.done);
+    drawModelBefore(before, twin.model_before, context, () => read());
     figure.closest(".card").hidden = regimes.closest(".card").hidden = !status.twin;
     for (const it of [latest, past]) it.closest(".card").hidden = !status.twin && !twin.diagnoses.length;
     if (!status.twin) return;

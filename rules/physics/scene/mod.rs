@@ -1,7 +1,9 @@
 //! What an effect sees: the inputs of a recording by the part they play.
 
+mod columns;
+
 use adapter_core::channel::quantity::Quantity;
-use recording::{Recording, Words, with_derived};
+use recording::{Recording, Words};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -134,7 +136,8 @@ pub enum SceneError {
 }
 
 /// A recording seen by the effects. Gaps of an input are filled by holding the last value within the run (a run's
-/// head by the first value that comes); [`Scene::usable_rows`] tells where an output value stands.
+/// head by the first value that comes), and only then are products of inputs formed: a product that was held across a gap
+/// would be that of other work. [`Scene::filled_rows`] tells where; [`Scene::usable_rows`] where an output value stands.
 #[derive(Debug, Clone)]
 pub struct Scene {
     rows: usize,
@@ -145,6 +148,7 @@ pub struct Scene {
     period_s: f64,
     columns: BTreeMap<String, Vec<f64>>,
     absent: BTreeMap<String, Vec<bool>>,
+    filled: BTreeMap<String, Vec<usize>>,
     words: BTreeMap<String, Words>,
     roles: BTreeMap<Role, String>,
     output: String,
@@ -169,7 +173,6 @@ impl Scene {
     /// # Errors
     /// [`SceneError::NoOutput`] when the output is not recorded.
     pub fn new(recording: &Recording, output: &str, roles: &BTreeMap<Role, String>) -> Result<Self, SceneError> {
-        let recording = with_derived(recording.clone());
         let measured = recording.find_numbers(output).ok_or_else(|| SceneError::NoOutput {
             output: output.to_owned(),
             hint: format!("Record the channel {output}, or name another output in the model."),
@@ -180,13 +183,14 @@ impl Scene {
         let mut scene = Self {
             rows: recording.count_rows(),
             time_s: recording.time_s.clone(),
-            clock_s: compute_clock_s(&recording, &runs),
+            clock_s: compute_clock_s(recording, &runs),
             period_s: compute_median_period_s(&recording.time_s, &runs),
             recorded: measured.iter().map(|value| value.unwrap_or(0.0)).collect(),
             usable: measured.iter().map(|value| value.is_some()).collect(),
             run_names,
             columns: BTreeMap::new(),
             absent: BTreeMap::new(),
+            filled: BTreeMap::new(),
             words: BTreeMap::new(),
             roles: BTreeMap::new(),
             output: output.to_owned(),
@@ -199,26 +203,10 @@ impl Scene {
             usual_cut: OnceLock::new(),
             runs,
         };
-        scene.read_columns(&recording);
+        scene.read_columns(recording);
         scene.assign_roles(roles);
         scene.passes = scene.find_passes();
         Ok(scene)
-    }
-
-    fn read_columns(&mut self, recording: &Recording) {
-        for column in recording.columns() {
-            match &column.cells {
-                recording::Cells::Numbers(numbers) if numbers.count_present() > 0 => {
-                    let values: Vec<Option<f64>> = numbers.iter().collect();
-                    self.absent.insert(column.name.clone(), values.iter().map(Option::is_none).collect());
-                    self.columns.insert(column.name.clone(), fill_by_holding(&values, &self.runs));
-                }
-                recording::Cells::Words(words) if !words.words().is_empty() => {
-                    self.words.insert(column.name.clone(), words.clone());
-                }
-                _ => {}
-            }
-        }
     }
 
     fn assign_roles(&mut self, declared: &BTreeMap<Role, String>) {
@@ -324,10 +312,21 @@ impl Scene {
         self.columns.keys().map(String::as_str)
     }
 
+    /// Names of the columns of words.
+    pub fn text_column_names(&self) -> impl Iterator<Item = &str> {
+        self.words.keys().map(String::as_str)
+    }
+
     /// Where a quantity has no value of its own (the filled value is held).
     #[must_use]
     pub fn absent_rows(&self, name: &str) -> Option<&[bool]> {
         self.absent.get(name).map(Vec::as_slice)
+    }
+
+    /// The rows of a column, of numbers or of words, whose value is not recorded but filled in, or follows from one that is.
+    #[must_use]
+    pub fn filled_rows(&self, name: &str) -> &[usize] {
+        self.filled.get(name).map_or(&[], Vec::as_slice)
     }
 
     /// A text column by its name.
@@ -474,17 +473,4 @@ fn compute_clock_s(recording: &Recording, runs: &[Range<usize>]) -> Vec<f64> {
 fn compute_median_period_s(time_s: &[f64], runs: &[Range<usize>]) -> f64 {
     let steps = runs.iter().flat_map(|run| time_s[run.clone()].windows(2).map(|pair| pair[1] - pair[0]));
     numerics::statistics::median(steps.filter(|step| *step > 0.0).collect()).unwrap_or(1.0)
-}
-
-fn fill_by_holding(values: &[Option<f64>], runs: &[Range<usize>]) -> Vec<f64> {
-    let mut filled = vec![0.0; values.len()];
-    for run in runs {
-        let head = values[run.clone()].iter().flatten().next().copied().unwrap_or(0.0);
-        let mut last = head;
-        for row in run.clone() {
-            last = values[row].unwrap_or(last);
-            filled[row] = last;
-        }
-    }
-    filled
 }

@@ -93,7 +93,8 @@ pub fn diagnose_recording(recording: &Recording, model: &Model, seed: u64) -> Re
     };
     let inputs = RecordingInputs::new(&scene, &case.units, &case.held, mark_comparable_rows(&scene, &baseline));
     let bank = families::build_bank(&inputs, model);
-    let outliers = detect_outliers(&inputs, &bank, &baseline.tangents);
+    let mut outliers = detect_outliers(&inputs, &bank, &baseline.tangents);
+    outliers.dither_exact_output(&inputs);
     let compared =
         ComparisonInput { tangents: &baseline.tangents, recorded: &outliers.recorded, scale: &outliers.scale };
     let first = Comparison::new(&inputs, &bank, &compared, ROWS_MAX);

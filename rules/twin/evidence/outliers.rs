@@ -5,6 +5,7 @@
 use super::inputs::RecordingInputs;
 use super::linear_algebra::{CholeskyFactor, compute_gram_matrix};
 use super::variant_bank::VariantBank;
+use crate::hold_out::Random;
 use ndarray::{Array1, Array2, ShapeBuilder};
 use numerics::statistics::{count_to_f64, median, quantile, rms, robust_deviation};
 
@@ -30,6 +31,31 @@ pub(super) struct Outliers {
     pub(super) recorded: Vec<f64>,
     /// What the wide smooth model leaves.
     pub(super) left: Vec<f64>,
+}
+
+/// Noise below this share of the output's size is none that a meter has: a series that a formula has written has its last digits.
+const RESOLUTION: f64 = 1e-6;
+
+impl Outliers {
+    /// A recording without any noise makes every law infinitely likely or impossible. Noise that is finer than any meter stands in
+    /// for what is not there, the same for the same recording.
+    pub(super) fn dither_exact_output(&mut self, inputs: &RecordingInputs<'_>) {
+        let taken: Vec<f64> = inputs.fitted_rows(false).map(|row| self.recorded[row]).collect();
+        let size = RESOLUTION * rms(&taken);
+        if self.ordinary >= size {
+            return;
+        }
+        let mut random = Random::new(1);
+        // Even numbers of this width have the deviation that is wanted.
+        let width = 12.0_f64.sqrt() * size;
+        for row in 0..inputs.rows {
+            let step = width * (random.draw_uniform() - 0.5);
+            self.recorded[row] += step;
+            self.left[row] += step;
+        }
+        self.scale.fill(1.0);
+        self.ordinary = size;
+    }
 }
 
 pub(super) fn detect_outliers(inputs: &RecordingInputs<'_>, bank: &VariantBank, tangents: &[Vec<f64>]) -> Outliers {

@@ -14,7 +14,7 @@ use std::fmt;
 const WARM_S: f64 = 1800.0;
 
 /// Kinds that describe a stretch of a past recording and say nothing about the present.
-const OF_THE_PAST: [&str; 2] = ["zero_drift", "auxiliary_switch"];
+pub(super) const OF_THE_PAST: [&str; 2] = ["zero_drift", "auxiliary_switch"];
 
 /// Why there is no expected output, or no residual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -9,6 +9,7 @@ pub mod control_chart;
 pub mod expectation;
 #[cfg(test)]
 mod false_alarms;
+pub mod feed;
 pub mod learn;
 pub mod noise;
 pub mod regime;
@@ -18,6 +19,7 @@ pub mod window;
 
 pub use control_chart::LevelChange;
 pub use expectation::{ComparedSecond, NoTwin};
+pub use feed::list_unfed_inputs;
 pub use regime::Regime;
 pub use watch::{Mismatch, Notice, RegimeStage};
 
