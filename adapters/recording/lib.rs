@@ -192,7 +192,8 @@ impl Cells {
     }
 
     /// The cells of these rows, in this order.
-    fn take_rows(&self, rows: &[usize]) -> Self {
+    #[must_use]
+    pub fn take_rows(&self, rows: &[usize]) -> Self {
         match self {
             Self::Numbers(numbers) => Self::Numbers(rows.iter().map(|row| numbers.get(*row)).collect()),
             Self::Words(words) => Self::Words(words.at_rows(rows.iter().copied())),

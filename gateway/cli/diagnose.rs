@@ -7,6 +7,7 @@ use crate::diagnosis::series::{AlignBy, SimulatedSeries, attach_series, recorded
 use crate::diagnosis::{
     Copies, DiagnosisOutputs, InputRecordings, read_hypotheses, read_model, read_recordings_as, stretch,
 };
+use adapters::recording::Recording;
 use clap::Args;
 use rules::twin::{self, Diagnosis, Model};
 use std::path::PathBuf;
@@ -59,6 +60,7 @@ pub(super) struct DiagnoseArguments {
 /// Reads, examines, compares, writes.
 pub(super) fn diagnose_recordings(arguments: DiagnoseArguments) -> CommandResult {
     let (model, given) = read_inputs(&arguments)?;
+    let (given, long) = thin_input(given, arguments.rows.is_some());
     given.warnings.iter().for_each(|warning| eprintln!("{}", localize_text(warning)));
     let examination = twin::examine_recording(&given.recording, &model);
     let mut unusable = examination.unusable;
@@ -77,8 +79,30 @@ pub(super) fn diagnose_recordings(arguments: DiagnoseArguments) -> CommandResult
     if arguments.search {
         eprintln!("{}", diagnosis.debug);
     }
-    collect_outputs(&arguments).write(&diagnosis, &given.recording, &context).map_err(CannotRun::from_error)?;
+    let mut outputs = collect_outputs(&arguments);
+    if let Some(LongInput { whole, rows }) = long {
+        outputs
+            .write_rows(&diagnosis.rows.expand_rows(&rows, whole.count_rows()), &diagnosis, &whole)
+            .map_err(CannotRun::from_error)?;
+        outputs.rows = None;
+    }
+    outputs.write(&diagnosis, &given.recording, &context).map_err(CannotRun::from_error)?;
     Ok(CommandOutcome::Fine)
+}
+
+/// A recording of which not every row is compared, where every row is to be written.
+struct LongInput {
+    whole: Recording,
+    /// The rows that are compared.
+    rows: Vec<usize>,
+}
+
+/// Of a long recording the rows that are compared; the whole is kept only where its rows are to be written.
+fn thin_input(mut given: InputRecordings, writes_rows: bool) -> (InputRecordings, Option<LongInput>) {
+    let Some(thinned) = twin::thin_recording(&given.recording) else { return (given, None) };
+    given.warnings.push(thinned.describe_thinning(given.recording.count_rows()));
+    let whole = std::mem::replace(&mut given.recording, thinned.recording);
+    (given, writes_rows.then_some(LongInput { whole, rows: thinned.rows }))
 }
 
 /// Model, hypotheses and recordings; every problem of all of them at once.

@@ -202,7 +202,11 @@ fn read_input(job: &DiagnosisJob) -> Result<Compared, String> {
 fn run_job(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), String> {
     let tell = |stage, rows| write_message(&ChildMessage::Stage(stage, rows)).map_err(|error| error.to_string());
     tell(Stage::Reading, 0)?;
-    let Compared { model, recording, reading, from_ns, to_ns } = read_input(job)?;
+    let Compared { model, mut recording, mut reading, from_ns, to_ns } = read_input(job)?;
+    if let Some(thinned) = twin::thin_recording(&recording) {
+        reading.push(thinned.describe_thinning(recording.count_rows()));
+        recording = thinned.recording;
+    }
     tell(Stage::Comparing, recording.count_rows())?;
     let examination = twin::examine_recording(&recording, &model);
     let context = DiagnosisContext::from_recording(&recording, &model, reading);

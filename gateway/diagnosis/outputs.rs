@@ -4,8 +4,9 @@ use super::context::DiagnosisContext;
 use crate::report::{PageInput, page};
 use recording::Recording;
 use rules::physics::explain::Language;
+use rules::twin::diagnosis::{Rows, Verdict};
 use rules::twin::plan::plan_experiments;
-use rules::twin::{Diagnosis, diagnosis::Verdict, json_report, text_report, write_model};
+use rules::twin::{Diagnosis, json_report, text_report, write_model};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -52,9 +53,7 @@ impl DiagnosisOutputs {
         if let Some(path) = &self.html {
             write_output(path, &page(&PageInput { diagnosis, recording, context, language: self.language }))?;
         }
-        if let Some(path) = &self.rows {
-            write_output(path, &format_rows(diagnosis, recording))?;
-        }
+        self.write_rows(&diagnosis.rows, diagnosis, recording)?;
         if let Some(path) = &self.experiment {
             match plan_experiments(diagnosis, recording) {
                 Ok(plan) => write_output(path, &plan.to_csv(self.language))?,
@@ -69,6 +68,17 @@ impl DiagnosisOutputs {
             None => {}
         }
         Ok(())
+    }
+}
+
+impl DiagnosisOutputs {
+    /// Writes the rows of a diagnosis, where they are asked for: one line for each row of `recording`.
+    ///
+    /// # Errors
+    /// The file that cannot be written, and why.
+    pub fn write_rows(&self, rows: &Rows, diagnosis: &Diagnosis, recording: &Recording) -> Result<(), OutputError> {
+        let Some(path) = &self.rows else { return Ok(()) };
+        write_output(path, &format_rows(rows, &diagnosis.output, recording))
     }
 }
 
@@ -90,16 +100,16 @@ pub(super) fn diagnosis_to_json(diagnosis: &Diagnosis, context: &DiagnosisContex
 }
 
 /// The rows as the contract wants them: one line per row of the input, in input order.
-fn format_rows(diagnosis: &Diagnosis, recording: &Recording) -> String {
+fn format_rows(rows: &Rows, output: &str, recording: &Recording) -> String {
     let mut names = Vec::with_capacity(recording.count_rows());
     for run in recording.list_runs() {
         names.extend(std::iter::repeat_n(run.name, run.rows.len()));
     }
-    let recorded: Vec<Option<f64>> = match recording.find_numbers(&diagnosis.output) {
+    let recorded: Vec<Option<f64>> = match recording.find_numbers(output) {
         Some(numbers) => numbers.iter().collect(),
         None => vec![None; recording.count_rows()],
     };
-    json_report::format_rows_csv(&recording.time_s, &names, &recorded, &diagnosis.rows)
+    json_report::format_rows_csv(&recording.time_s, &names, &recorded, rows)
 }
 
 fn is_stdout(path: &Path) -> bool {

@@ -108,6 +108,7 @@ mod tests {
             diameter_mm: 60.0,
             axis_speed: 3000.0,
             axis_column: "z_axis_velocity_mm_min".to_owned(),
+            drive_alone: false,
             spindle: true,
         };
         let steps = group_steps(&build_plan(&["no_load_power"], &envelope));

@@ -140,6 +140,8 @@ pub struct Fits {
     pub before: Quality,
     /// The model refitted with it.
     pub after: Quality,
+    /// A free curve in its place, which no law could beat; `None` where nothing was found.
+    pub ceiling: Option<Quality>,
 }
 
 impl Fits {
@@ -155,6 +157,8 @@ impl Fits {
 pub struct Experiment {
     /// What to do, in words.
     pub statement: String,
+    /// The same in Chinese, where it is not that of the effect in the catalogue.
+    pub statement_zh: Option<&'static str>,
     /// How long it takes.
     pub minutes: f64,
     /// Information it is expected to bring between the best explanations.
@@ -201,6 +205,8 @@ pub struct Diagnosis {
     pub baseline_shift: Vec<Shift>,
     /// Faults of the recording.
     pub data_quality: Vec<Fault>,
+    /// What is left where nothing is told to be missing, and is no white noise: under which switch, over which position, how slow.
+    pub remainder: Vec<Bilingual>,
     /// What to record next.
     pub next_experiment: Option<Experiment>,
     /// The simulations row by row, before and after.
@@ -209,6 +215,31 @@ pub struct Diagnosis {
     pub model: Model,
     /// The leading explanations with their probabilities, for engineers.
     pub debug: String,
+}
+
+impl Rows {
+    /// The rows of the whole recording, of which these stand at `kept`; nothing was computed for the others.
+    #[must_use]
+    pub fn expand_rows(&self, kept: &[usize], whole: usize) -> Self {
+        let spread = |values: &[Option<f64>]| {
+            let mut all = vec![None; whole];
+            kept.iter().zip(values).for_each(|(row, value)| all[*row] = *value);
+            all
+        };
+        let mut compared = vec![false; whole];
+        kept.iter().zip(&self.compared).for_each(|(row, it)| compared[*row] = *it);
+        let effects = self.effects.iter().map(|(name, values)| {
+            let mut all = vec![0.0; whole];
+            kept.iter().zip(values).for_each(|(row, value)| all[*row] = *value);
+            (name.clone(), all)
+        });
+        Self {
+            simulated_before: spread(&self.simulated_before),
+            simulated_after: spread(&self.simulated_after),
+            compared,
+            effects: effects.collect(),
+        }
+    }
 }
 
 impl Diagnosis {

@@ -40,6 +40,7 @@ pub fn to_json(diagnosis: &Diagnosis) -> Value {
         "alternatives": diagnosis.alternatives.iter().map(encode_alternative).collect::<Vec<_>>(),
         "baseline_shift": diagnosis.baseline_shift.iter().map(encode_shift).collect::<Vec<_>>(),
         "data_quality": faults.map(|f| json!({ "fault": f.kind.as_word(), "column": f.column, "rows": f.rows })).collect::<Vec<_>>(),
+        "remainder": diagnosis.remainder.iter().map(|left| left.en.as_str()).collect::<Vec<_>>(),
         "next_experiment": diagnosis.next_experiment.as_ref().map_or(Value::Null, encode_experiment),
     })
 }
@@ -128,6 +129,7 @@ fn encode_shift(shift: &Shift) -> Value {
 fn encode_experiment(experiment: &Experiment) -> Value {
     json!({
         "statement": experiment.statement,
+        "statement_zh": experiment.statement_zh,
         "minutes": encode_number(experiment.minutes),
         "expected_delta_ic": encode_number(experiment.expected_delta_ic),
         "effect": experiment.effect,

@@ -41,10 +41,13 @@ pub mod speed_table;
 pub mod summary;
 pub mod term;
 pub mod text_report;
+mod thin;
 
 pub use diagnosis::Diagnosis;
 pub use evidence::diagnose_recording;
 pub use examine::{Examination, examine_recording};
 pub use model::{Model, Parameter, Part, PartFunction, Simulated, simulate_parts};
 pub use model_file::{Problem, format_toml_text, parse_hypotheses, parse_model, write_model};
+pub use thin::{ThinnedRecording, thin_recording};
+
 use numerics::linear::columns as linear;

@@ -31,7 +31,29 @@ pub(super) fn build_alternative(kind: &str, instead_of: &str, delta_ic: f64) -> 
 /// An experiment, its gain in information within the bounds in which it is told.
 pub(super) fn build_experiment(statement: String, minutes: f64, gain: f64, effect: &str) -> Experiment {
     let expected_delta_ic = gain.clamp(GAIN_BOUNDS.0, GAIN_BOUNDS.1);
-    Experiment { statement, minutes, expected_delta_ic, effect: effect.to_owned() }
+    Experiment { statement, statement_zh: None, minutes, expected_delta_ic, effect: effect.to_owned() }
+}
+
+/// The experiment in the words of a drive on its own, which has no spindle and no cut; `moves::list_drive_moves` carries it out.
+pub(super) fn describe_drive_experiment(kind: &str) -> (&'static str, &'static str) {
+    match kind {
+        "clock_lag" | "meter_window" | "axis_inertia" | "regeneration" | "engagement_timing" => (
+            "start and stop the axis ten times at its full speed, with two seconds of rest between",
+            "以全速启停该轴十次，每次间隔静止两秒",
+        ),
+        "stribeck" | "dry_friction" | "viscous_friction" | "axis_friction" | "direction_asymmetry" => (
+            "move the axis back and forth at steady speeds from a hundredth of its full speed up, eight seconds each way, twice",
+            "以从全速百分之一起的多个恒定速度往返移动该轴，每个方向八秒，重复两次",
+        ),
+        "bearing_warm_up" | "preload_growth" | "zero_drift" | "ambient_drift" => (
+            "let the axis rest for a minute, move it for ten minutes, let it rest again for a minute, and repeat both",
+            "让该轴静止一分钟，运行十分钟，再静止一分钟，重复一次",
+        ),
+        _ => (
+            "move the axis back and forth over its whole way at a fifth, at half and at full speed, ten seconds each way, twice",
+            "以全速的五分之一、二分之一和全速在全行程内往返移动该轴，每个方向十秒，重复两次",
+        ),
+    }
 }
 
 /// To learn what depends on this channel; on nothing that is known where there is none.

@@ -7,7 +7,7 @@ use super::region::Condition;
 use adapter_core::channel::quantity::Quantity;
 use numerics::statistics::count_to_f64;
 use recording::Recording;
-use recording::{Words, derive_quantity};
+use recording::{Numbers, Words, derive_quantity};
 
 /// Price of one condition, in shares of what is covered: a reader takes it in for a thirtieth. Lower: words that cover noise;
 /// higher: one condition where two are needed.
@@ -44,7 +44,7 @@ impl<'a> PlaceSearch<'a> {
         for column in recording.columns() {
             let name = column.name.as_str();
             if let Some(numbers) = recording.find_numbers(name).filter(|_| is_place_column(name, output)) {
-                columns.push(PlaceColumn::Numbers(name.to_owned(), rows.iter().map(|row| numbers.get(*row)).collect()));
+                columns.push(PlaceColumn::Numbers(name.to_owned(), read_values(numbers, &rows)));
             }
             if let Some(words) = recording
                 .find_words(name)
@@ -57,7 +57,7 @@ impl<'a> PlaceSearch<'a> {
             if recording.find_numbers(name).is_none()
                 && let Some(numbers) = derive_quantity(recording, name)
             {
-                columns.push(PlaceColumn::Numbers(name.to_owned(), rows.iter().map(|row| numbers.get(*row)).collect()));
+                columns.push(PlaceColumn::Numbers(name.to_owned(), read_values(&numbers, &rows)));
             }
         }
         if recording.pauses_known() {
@@ -204,6 +204,15 @@ impl<'a> PlaceSearch<'a> {
     }
 }
 
+/// Beside its greatest value so small a value of a column is zero: what a computation leaves of it is no place.
+const NOTHING: f64 = 1e-9;
+
+fn read_values(numbers: &Numbers, rows: &[usize]) -> Vec<Option<f64>> {
+    let top = numbers.present_values().fold(0.0_f64, |top, x| top.max(x.abs()));
+    let value = |row: &usize| numbers.get(*row).map(|x| if x.abs() < NOTHING * top { 0.0 } else { x });
+    rows.iter().map(value).collect()
+}
+
 /// So many of so many.
 fn compute_share(part: usize, whole: usize) -> f64 {
     count_to_f64(part) / count_to_f64(whole.max(1))
@@ -285,7 +294,7 @@ fn build_range(name: &str, low: f64, high: f64) -> Option<Condition> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use recording::{Cells, Numbers};
+    use recording::Cells;
 
     /// 24 parts, an edge changed every six; an effect from the second minute of an edge on.
     fn recording() -> (Recording, Vec<f64>) {

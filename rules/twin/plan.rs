@@ -39,6 +39,8 @@ pub struct Envelope {
     pub axis_speed: f64,
     /// Column of the axis velocity.
     pub axis_column: String,
+    /// Is it a drive on its own, with neither a spindle nor a cut?
+    pub drive_alone: bool,
     /// Is it the spindle that is compared? Then friction is that of its bearings and belt.
     pub spindle: bool,
 }
@@ -86,13 +88,14 @@ pub fn plan_experiments(diagnosis: &Diagnosis, recording: &Recording) -> Result<
     if kinds.is_empty() {
         return Err(NothingToTellApart { verdict: diagnosis.verdict });
     }
-    Ok(build_plan(&kinds, &Envelope::from_recording(recording, diagnosis)))
+    Ok(build_plan(&kinds, &Envelope::from_recording(recording, &diagnosis.output, &diagnosis.model.roles)))
 }
 
 /// The plan of these kinds, one experiment after the other.
 #[must_use]
 pub fn build_plan(kinds: &[&str], envelope: &Envelope) -> Plan {
-    let mut all = vec![moves::build_standstill(20.0)];
+    let standstill = moves::build_rest(envelope, 20.0);
+    let mut all = vec![standstill.clone()];
     let mut run = 1;
     for kind in kinds {
         let one = moves::list_moves(kind, envelope);
@@ -101,7 +104,7 @@ pub fn build_plan(kinds: &[&str], envelope: &Envelope) -> Plan {
         run += last;
     }
     let last = all.last().map_or(1, |a| a.run);
-    all.push(Move { run: last, ..moves::build_standstill(20.0) });
+    all.push(Move { run: last, ..standstill });
     Plan { kinds: kinds.iter().map(|kind| (*kind).to_owned()).collect(), moves: all }
 }
 
@@ -138,8 +141,8 @@ fn select_kinds<'a>(wanted: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 impl Envelope {
     /// The range of a recording; usual values of a small lathe stand in for what it does not hold.
     #[must_use]
-    pub fn from_recording(recording: &Recording, diagnosis: &Diagnosis) -> Self {
-        let scene = Scene::new(recording, &diagnosis.output, &diagnosis.model.roles).ok();
+    pub fn from_recording(recording: &Recording, output: &str, roles: &BTreeMap<Role, String>) -> Self {
+        let scene = Scene::new(recording, output, roles).ok();
         let column = |name: &str| scene.as_ref().and_then(|scene| scene.column(name)).map(<[f64]>::to_vec);
         let role = |role: Role| scene.as_ref().and_then(|scene| scene.role_values(role)).map(<[f64]>::to_vec);
         let engaged = role(Role::Engaged);
@@ -150,6 +153,7 @@ impl Envelope {
             (_, values) => values,
         };
         let speed = role(Role::Speed);
+        let drive_alone = engaged.is_none() && speed.is_none() && role(Role::Velocity).is_some();
         let axis_column = scene.as_ref().and_then(|scene| scene.role_name(Role::Velocity)).map(str::to_owned);
         let axis_speed = role(Role::Velocity).map_or(0.0, |v| v.iter().fold(0.0_f64, |top, x| top.max(x.abs())));
         Self {
@@ -160,7 +164,8 @@ impl Envelope {
             diameter_mm: compute_median_size(in_cut(column("diameter_mm")), 60.0),
             axis_speed: if axis_speed > 0.0 { axis_speed } else { 3000.0 },
             axis_column: axis_column.unwrap_or_else(|| "axis_velocity_mm_min".to_owned()),
-            spindle: is_of_spindle(&diagnosis.output),
+            drive_alone,
+            spindle: is_of_spindle(output),
         }
     }
 }
@@ -242,6 +247,7 @@ mod tests {
             diameter_mm: 60.0,
             axis_speed: 3000.0,
             axis_column: "axis_velocity_mm_min".to_owned(),
+            drive_alone: false,
             spindle: false,
         }
     }
@@ -263,6 +269,18 @@ mod tests {
                 doc.kind,
                 plan.duration_min()
             );
+        }
+    }
+
+    #[test]
+    fn a_drive_on_its_own_is_never_asked_to_turn_a_spindle_or_to_cut() {
+        let alone =
+            Envelope { drive_alone: true, axis_column: "velocity_m_s".to_owned(), axis_speed: 0.5, ..envelope() };
+        for doc in CATALOGUE.iter().map(|effect| effect.doc()) {
+            let plan = build_plan(&[doc.kind], &alone);
+            assert!(plan.moves.iter().all(|a| a.commands.keys().eq(["velocity_m_s"])), "{}", doc.kind);
+            let (en, zh) = crate::next_step::describe_drive_experiment(doc.kind);
+            assert!(!en.contains("spindle") && !en.contains("cut") && !zh.contains("切"), "{}", doc.kind);
         }
     }
 

@@ -1,7 +1,7 @@
 //! Where: the region of time and of operating space in which a missing effect acts.
 
-use super::text_report::format_short_number;
-use numerics::statistics::quantile;
+use super::text_report::{format_short_number, format_signed_number};
+use numerics::statistics::{count_to_f64, quantile};
 use physics::Scene;
 use physics::explain::Language;
 
@@ -93,12 +93,44 @@ pub struct Region {
     pub share: f64,
     /// Mean contribution here, in the output's unit.
     pub mean: f64,
+    /// Root mean square here of an effect that has both signs, in the output's unit: its mean tells nothing.
+    pub both_signs: Option<f64>,
     /// Conditions that hold together.
     pub conditions: Vec<Condition>,
     /// Every stretch of affected rows.
     pub spans: Vec<Span>,
     /// Since when, where it was not there from the start.
     pub onset: Option<OnsetInterval>,
+}
+
+/// Share of the squares that the rarer sign of an effect must have for it to be one of both signs: less is the noise of the
+/// estimate about a level.
+const OTHER_SIGN: f64 = 0.05;
+
+/// The root mean square of an effect over these rows where it has both signs there.
+#[must_use]
+pub fn measure_both_signs(contribution: &[f64], active: &[bool]) -> Option<f64> {
+    let inside = || contribution.iter().zip(active).filter(|(_, active)| **active).map(|(x, _)| *x);
+    let square = |above: bool| inside().filter(|x| (*x > 0.0) == above).map(|x| x * x).sum::<f64>();
+    let (up, down) = (square(true), square(false));
+    (up.min(down) > OTHER_SIGN * (up + down)).then(|| ((up + down) / count_to_f64(inside().count())).sqrt())
+}
+
+impl Region {
+    /// How much it is here, in words: a mean, or what is typical where both signs would cancel.
+    #[must_use]
+    pub fn describe_amount(&self, language: Language, unit: &str) -> String {
+        match self.both_signs.map(format_short_number) {
+            Some(size) => language.select_text(
+                format!("of both signs, typically ±{size} {unit}"),
+                format!("正负交替，典型大小±{size} {unit}"),
+            ),
+            None => {
+                let mean = format_signed_number(self.mean);
+                language.select_text(format!("on average {mean} {unit}"), format!("平均{mean} {unit}"))
+            }
+        }
+    }
 }
 
 /// The usual greatest size of a contribution.
@@ -141,6 +173,24 @@ fn build_span(scene: &Scene, run: &str, (first, last): (usize, usize)) -> Span {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_friction_is_of_both_signs_and_a_level_is_not() {
+        let friction: Vec<f64> = (0..100).map(|row| if row % 4 == 0 { 40.0 } else { -40.0 }).collect();
+        let level: Vec<f64> = (0..100).map(|row| if row % 10 == 0 { -2.0 } else { 40.0 }).collect();
+        assert_eq!(measure_both_signs(&friction, &[true; 100]), Some(40.0));
+        assert_eq!(measure_both_signs(&level, &[true; 100]), None);
+        let region = Region {
+            effect: "dry_friction".to_owned(),
+            share: 1.0,
+            mean: -20.0,
+            both_signs: Some(40.0),
+            conditions: Vec::new(),
+            spans: Vec::new(),
+            onset: None,
+        };
+        assert_eq!(region.describe_amount(Language::En, "N"), "of both signs, typically ±40 N");
+    }
 
     #[test]
     fn limits_of_a_condition_keep_their_digits_in_both_languages() {

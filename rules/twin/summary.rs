@@ -1,7 +1,7 @@
 //! The diagnosis in plain words, in both languages.
 
 use super::diagnosis::{Diagnosis, Existence, UNKNOWN, Verdict};
-use super::text_report::{format_short_number, format_signed_number};
+use super::text_report::format_short_number;
 use adapter_core::bilingual::Bilingual;
 use physics::explain::Language;
 use physics::find_effect;
@@ -25,8 +25,9 @@ pub fn summarise_diagnosis(diagnosis: &Diagnosis) -> Bilingual {
             format!("模型缺少{names_zh}{}。{}", place.zh, fit.zh),
         ),
         Verdict::Ambiguous => {
-            let mut others: Vec<Bilingual> =
-                diagnosis.alternatives.iter().map(|other| describe_kind(&other.effect)).collect();
+            let near = diagnosis.alternatives.iter().filter(|other| !other.is_remote());
+            let mut others: Vec<Bilingual> = near.map(|other| describe_kind(&other.effect)).collect();
+            others.dedup();
             if others.is_empty() {
                 others.push(describe_kind(UNKNOWN));
             }
@@ -59,10 +60,23 @@ fn describe_kind(kind: &str) -> Bilingual {
 
 /// That nothing is missing is an answer too, and tells how it is known.
 fn describe_agreement(diagnosis: &Diagnosis) -> Bilingual {
-    let mut text = Bilingual::new(
-        "The recording agrees with the model: nothing remains beyond the noise.",
-        "记录与模型一致：除噪声外没有其他偏差。",
-    );
+    let mut text = match diagnosis.remainder.is_empty() {
+        true => Bilingual::new(
+            "The recording agrees with the model: nothing remains beyond the noise.",
+            "记录与模型一致：除噪声外没有其他偏差。",
+        ),
+        false => {
+            let left = |of: &dyn Fn(&Bilingual) -> &str| join_texts(&diagnosis.remainder, of, "; ");
+            Bilingual::new(
+                format!(
+                    "No effect that is known is missing from the model. What is left is not noise alone, or cannot be told \
+                     from it: {}.",
+                    left(&|text| &text.en)
+                ),
+                format!("模型没有缺少已知效应。但剩余部分不全是噪声，或无法与噪声区分：{}。", left(&|text| &text.zh)),
+            )
+        }
+    };
     if let Some(Existence { probability_of_nothing, effective_rows, .. }) = diagnosis.existence {
         text.en.push_str(&format!(
             " Probability that nothing is missing: {probability_of_nothing:.2}; the recording is worth \
@@ -147,7 +161,8 @@ fn describe_improvement(diagnosis: &Diagnosis) -> Bilingual {
 
 fn describe_region(diagnosis: &Diagnosis) -> Bilingual {
     let Some(first) = diagnosis.mismatch.first() else { return Bilingual::default() };
-    let (mean, unit) = (format_signed_number(first.mean), &diagnosis.unit);
+    let [amount, amount_zh] =
+        [Language::En, Language::Zh].map(|language| first.describe_amount(language, &diagnosis.unit));
     let joined = |language: Language, between: &str| {
         first.conditions.iter().map(|condition| condition.describe(language)).collect::<Vec<_>>().join(between)
     };
@@ -160,7 +175,7 @@ fn describe_region(diagnosis: &Diagnosis) -> Bilingual {
         place.en.push_str(&format!(", since run {} at {:.0} s", onset.run, onset.time_s));
         place.zh.push_str(&format!("，始于批次{}的{:.0} s", onset.run, onset.time_s));
     }
-    place.en.push_str(&format!(" (on average {mean} {unit})"));
-    place.zh.push_str(&format!("（平均{mean} {unit}）"));
+    place.en.push_str(&format!(" ({amount})"));
+    place.zh.push_str(&format!("（{amount_zh}）"));
     place
 }

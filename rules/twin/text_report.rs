@@ -87,15 +87,15 @@ impl Say<'_> {
     }
 
     fn describe_region(&self, region: &Region) -> Vec<String> {
-        let (share, mean, unit) = (100.0 * region.share, format_signed_number(region.mean), self.unit);
+        let (share, amount) = (100.0 * region.share, region.describe_amount(self.language, self.unit));
         let place: Vec<String> = region.conditions.iter().map(|condition| condition.describe(self.language)).collect();
         let place = match place.is_empty() {
             true => self.language.select_text("everywhere", "所有工况").to_owned(),
             false => place.join(self.language.select_text(" and ", "，且")),
         };
         let mut lines = vec![self.language.select_text(
-            format!("{place}: {share:.0} % of it, on average {mean} {unit}"),
-            format!("{place}：占{share:.0} %，平均{mean} {unit}"),
+            format!("{place}: {share:.0} % of it, {amount}"),
+            format!("{place}：占{share:.0} %，{amount}"),
         )];
         if let Some(onset) = &region.onset {
             let (run, at, low, high) = (&onset.run, onset.time_s, onset.low_s, onset.high_s);
@@ -209,10 +209,15 @@ impl Say<'_> {
     fn describe_alternative(&self, other: &Alternative) -> Vec<String> {
         let (name, instead) = (self.describe_effect(&other.effect), self.describe_effect(&other.instead_of));
         let experiment = self.select_experiment_text(other);
+        // What is told as nearly ruled out is not told as possible in the same breath.
+        let (could, could_zh) = match other.is_remote() {
+            true => ("least likely of what is listed is", "列出的解释中可能性最小的是"),
+            false => ("it could also be", "也可能是"),
+        };
         vec![
             self.language.select_text(
-                format!("it could also be {name} instead of {instead}, {}", describe_odds(other.delta_ic)),
-                format!("也可能是{name}而不是{instead}，{}", describe_odds_zh(other.delta_ic)),
+                format!("{could} {name} instead of {instead}, {}", describe_odds(other.delta_ic)),
+                format!("{could_zh}{name}而不是{instead}，{}", describe_odds_zh(other.delta_ic)),
             ),
             self.language
                 .select_text(format!("  what separates them: {experiment}"), format!("  区分方法：{experiment}")),
@@ -246,6 +251,7 @@ impl Say<'_> {
     fn describe_next_step(&self, diagnosis: &Diagnosis) -> Vec<String> {
         let Some(experiment) = &diagnosis.next_experiment else { return Vec::new() };
         let statement = match (self.language, find_effect(&experiment.effect)) {
+            (Language::Zh, _) if experiment.statement_zh.is_some() => experiment.statement_zh.unwrap_or_default(),
             (Language::Zh, Some(effect)) => effect.doc().zh.experiment,
             _ => experiment.statement.as_str(),
         };
@@ -272,6 +278,14 @@ impl Say<'_> {
                     .select_text(format!("{kind} in {column}: {rows} rows"), format!("{column}：{kind}，{rows}行"))
             })
             .collect()
+    }
+}
+
+impl Alternative {
+    /// Is it so much less likely that a number says no more?
+    #[must_use]
+    pub fn is_remote(&self) -> bool {
+        (0.5 * self.delta_ic).exp() > ODDS_MAX
     }
 }
 

@@ -4,10 +4,7 @@ use super::data::Data;
 use super::strip::{REGIONS_MAX, render_strip};
 use super::text::{format_fixed, format_number, format_signed, with_unit};
 use rules::physics::explain::Language;
-use rules::twin::region::{OnsetInterval, Region, compute_usual_size, mark_active_rows};
-
-/// Mean, as a share of the typical size, below which an effect counts as one of both signs.
-const MEAN_TELLS: f64 = 0.3;
+use rules::twin::region::{OnsetInterval, Region};
 
 /// The section; empty where nothing is located.
 pub(super) fn render_section(data: &Data<'_>) -> String {
@@ -65,7 +62,7 @@ fn describe_region(data: &Data<'_>, region: &Region) -> String {
 /// How much it is there: a mean, or a typical size where both signs would cancel.
 pub(super) fn describe_amount(data: &Data<'_>, region: &Region) -> String {
     let unit = data.output_unit();
-    match compute_effect_rms(data, &region.effect).filter(|size| region.mean.abs() < MEAN_TELLS * size) {
+    match region.both_signs {
         Some(size) => {
             let size = with_unit(&format!("±{}", format_number(size)), &unit);
             format!("{}{size}", data.pick_text("of both signs, typically ", "正负交替，典型大小"))
@@ -96,13 +93,4 @@ fn describe_onset(data: &Data<'_>, onset: &OnsetInterval) -> String {
         Language::En => format!("since {at} (95\u{202f}% between {low} and {high})"),
         Language::Zh => format!("自{at}起（95\u{202f}%区间{low}至{high}）"),
     }
-}
-
-/// Root mean square of an effect over the rows where it acts: an effect of both signs has a mean that tells little.
-fn compute_effect_rms(data: &Data<'_>, effect: &str) -> Option<f64> {
-    let (_, values) = data.diagnosis.rows.effects.iter().find(|(name, _)| name == effect)?;
-    let active = mark_active_rows(values, compute_usual_size(values));
-    let inside = values.iter().zip(active).filter(|(_, active)| *active);
-    let (sum, count) = inside.fold((0.0, 0_u32), |(sum, count), (x, _)| (sum + x * x, count.saturating_add(1)));
-    (count > 0).then(|| (sum / f64::from(count)).sqrt())
 }

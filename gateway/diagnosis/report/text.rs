@@ -3,6 +3,7 @@
 use adapter_core::channel::{ChannelId, quantity};
 use rules::physics::explain::Language;
 use rules::physics::{CATALOGUE, EffectDoc, find_effect};
+use rules::twin::diagnosis::Experiment;
 use rules::twin::region::Condition;
 
 /// Words of a condition that are listed.
@@ -64,6 +65,14 @@ impl Tongue {
         }
         let plain = || escape_html(&kind.replace('_', " "));
         find_effect(kind).map_or_else(plain, |effect| escape_html(effect.doc().texts(self.0).name))
+    }
+
+    /// What to record next, in the page's language. Escaped.
+    pub(super) fn translate_experiment(self, next: &Experiment) -> String {
+        match next.statement_zh.filter(|_| self.0 == Language::Zh) {
+            Some(zh) => escape_html(zh),
+            None => self.translate_catalogue(&next.statement),
+        }
     }
 
     /// A text of the catalogue in the page's language; other text as it is. Escaped.

@@ -75,6 +75,12 @@ fn format_headline(data: &Data<'_>) -> String {
                 "确实缺少某种影响，但目录中没有任何效应能解释它。",
             )
             .to_owned(),
+        (Verdict::NoMismatch, _) if !data.diagnosis.remainder.is_empty() => tongue
+            .pick_text(
+                "No known effect is missing, but what is left is not noise alone.",
+                "没有缺少已知效应，但剩余部分不全是噪声。",
+            )
+            .to_owned(),
         (Verdict::NoMismatch, _) => tongue.pick_text("Recording and simulation agree.", "记录与仿真一致。").to_owned(),
         (Verdict::CannotTell, _) => {
             tongue.pick_text("This recording cannot answer the question.", "此记录无法回答该问题。").to_owned()
@@ -89,6 +95,9 @@ fn format_lead(data: &Data<'_>) -> String {
             let needed = data.pick_text(&diagnosis.summary.en, &diagnosis.summary.zh);
             super::place::capitalise_first(&escape_html(needed.strip_prefix("Cannot tell: ").unwrap_or(needed)))
         }
+        Verdict::NoMismatch if !diagnosis.remainder.is_empty() => {
+            escape_html(data.pick_text(&diagnosis.summary.en, &diagnosis.summary.zh))
+        }
         Verdict::NoMismatch => data
             .pick_text(
                 "Beyond the noise nothing is left that any effect could explain. What the fitted parameters of the model can imitate would not show either.",
@@ -102,7 +111,7 @@ fn format_lead(data: &Data<'_>) -> String {
 /// What to do next, in one line; the whole stands below.
 fn next(data: &Data<'_>) -> String {
     let Some(next) = &data.diagnosis.next_experiment else { return String::new() };
-    let statement = data.tongue.translate_catalogue(&next.statement);
+    let statement = data.tongue.translate_experiment(next);
     let minutes = with_unit(&format_number(next.minutes), "min");
     format!(
         "<p class=\"do-next\"><b>{}</b> {} ({} {minutes})</p>",
@@ -140,9 +149,16 @@ fn describe_alternatives(data: &Data<'_>) -> String {
     if diagnosis.alternatives.is_empty() || diagnosis.verdict != Verdict::Ambiguous {
         return String::new();
     }
-    let mut names: Vec<String> =
-        diagnosis.alternatives.iter().map(|other| data.tongue.name_effect(&other.effect)).collect();
+    let mut names: Vec<String> = diagnosis
+        .alternatives
+        .iter()
+        .filter(|it| !it.is_remote())
+        .map(|it| data.tongue.name_effect(&it.effect))
+        .collect();
     names.dedup();
+    if names.is_empty() {
+        names.push(data.tongue.name_effect("unknown"));
+    }
     let names = data.tongue.join_words(&names, (" and ", "和"));
     match data.tongue.0 {
         Language::En => format!("Not ruled out: {names}. One short experiment tells them apart; it stands below."),
@@ -168,6 +184,13 @@ fn render_tiles(data: &Data<'_>, fit: &Fits) -> String {
         ),
     };
     let mut html = format!("<dl class=\"tiles\">{}", render_tile(&error, named));
+    if let Some(ceiling) = fit.ceiling.filter(|_| data.has_added_effects()) {
+        let error = if held { ceiling.held_out_rmse.unwrap_or(ceiling.rmse) } else { ceiling.rmse };
+        html.push_str(&render_tile(
+            &format!("{} <small>{unit}</small>", format_number(error)),
+            data.pick_text("least error that any curve could reach", "任何曲线可达到的最小误差"),
+        ));
+    }
     html.push_str(&render_tile(
         &format!("{} <small>{unit}</small>", format_number(fit.noise_floor)),
         data.pick_text("ordinary noise of this recording", "此记录的普通噪声"),

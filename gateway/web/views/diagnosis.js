@@ -173,12 +173,13 @@ function fitWords({ fit, unit }) {
   const held = fit.before.held_out_rmse ?? null;
   const of = (quality) =>
     (held === null ? quality?.rmse : quality?.held_out_rmse) ?? (held === null ? fit.before.rmse : held);
-  return t(
+  const words = t(
     held === null ? "fit_words_all" : "fit_words",
     quantity(of(fit.before), unit),
     quantity(of(fit.after), unit),
     quantity(fit.noise_floor, unit),
   );
+  return fit.ceiling ? `${words} ${t("ceiling_words", quantity(of(fit.ceiling), unit))}` : words;
 }
 
 function told(found, context, done) {
@@ -257,12 +258,12 @@ function experiment(found, d, done) {
   const statement =
     d.next_experiment &&
     (language() === "zh"
-      ? effectText(found, d.next_experiment.effect, "experiment", d.next_experiment.statement)
+      ? (d.next_experiment.statement_zh ??
+        effectText(found, d.next_experiment.effect, "experiment", d.next_experiment.statement))
       : d.next_experiment.statement);
+  const minutes = d.next_experiment?.minutes;
   if (!statement && !steps.length) return [];
-  const title = found.minutes
-    ? `${t("experiment")} (${t("about", `${number(Math.ceil(found.minutes))} ${t("min")}`)})`
-    : t("experiment");
+  const title = minutes ? `${t("experiment")} (${t("about", `${number(minutes)} ${t("min")}`)})` : t("experiment");
   const list = steps.length ? steps : [statement];
   const tick = list.map((text, at) => step(`${found.key}#${at}`, text, done));
   const listed = (all, start) =>
@@ -278,10 +279,7 @@ function experiment(found, d, done) {
     statement && steps.length ? make("p", "", statement) : null,
     listed(tick.slice(0, STEPS_IN_SIGHT), 1),
     rest.length
-      ? make("details", "", [
-          make("summary", "", t("more_steps", rest.length)),
-          listed(rest, STEPS_IN_SIGHT + 1),
-        ])
+      ? make("details", "", [make("summary", "", t("more_steps", rest.length)), listed(rest, STEPS_IN_SIGHT + 1)])
       : null,
   ].filter(Boolean);
 }

@@ -30,6 +30,7 @@ mod outliers;
 mod posterior;
 mod posterior_means;
 mod recursive_least_squares;
+mod remainder;
 mod report;
 mod resampling;
 mod search;
@@ -127,8 +128,10 @@ fn build_undecided_diagnosis(case: &Case<'_>, needed: &Bilingual) -> Diagnosis {
         alternatives: Vec::new(),
         baseline_shift: Vec::new(),
         data_quality: case.faults.clone(),
+        remainder: Vec::new(),
         next_experiment: Some(Experiment {
             statement: format!("Record {needed}."),
+            statement_zh: None,
             minutes: 10.0,
             expected_delta_ic: 0.0,
             effect: String::new(),

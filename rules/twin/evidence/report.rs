@@ -17,10 +17,13 @@ use crate::fit::Fit;
 use crate::inputs::mark_rows_with_inputs;
 use crate::intervals::FittedRows;
 use crate::model::{Model, Parameter, Part};
-use crate::next_step::{build_alternative, build_channel_experiment, find_effect_experiment};
+use crate::next_step::{
+    build_alternative, build_channel_experiment, describe_drive_experiment, find_effect_experiment,
+};
 use crate::place_search::PlaceSearch;
+use crate::plan::{Envelope, plan_experiments};
 use crate::prepared_recording::Case;
-use crate::region::{Region, compute_usual_size, list_spans, mark_active_rows};
+use crate::region::{Condition, Region, compute_usual_size, list_spans, mark_active_rows, measure_both_signs};
 use crate::summary;
 use adapter_core::bilingual::Bilingual;
 use numerics::statistics::{count_to_f64, rms};
@@ -29,6 +32,9 @@ use recording::Recording;
 
 /// Times that a name of impossible size is replaced by the nearest law beside it.
 const REPLACED_MAX: usize = 3;
+
+/// Share of the rows in which a law acts that must lie in its place: the others are edges of it.
+const ACTS_IN_PLACE: f64 = 0.98;
 
 /// Everything that is told.
 pub(super) struct EvidenceReport<'a, 'm> {
@@ -80,7 +86,7 @@ impl EvidenceReport<'_, '_> {
             verdict: self.answer.verdict,
             summary: Bilingual::default(),
             next_experiment: self.choose_experiment(&alternatives, withdrawn.as_ref().map_or(&[], |gone| &gone.found)),
-            mismatch: self.locate_regions(),
+            mismatch: self.locate_regions(&model.parts),
             rows: self.build_rows(),
             existence: Some(self.answer.existence),
             fit: Some(fits),
@@ -88,9 +94,18 @@ impl EvidenceReport<'_, '_> {
             missing,
             alternatives,
             data_quality: self.case.faults.clone(),
+            remainder: self.list_remainder(),
             model,
             debug: self.answer.debug.clone(),
         };
+        if let (Ok(plan), Some(next)) = (plan_experiments(&diagnosis, self.recording), &mut diagnosis.next_experiment) {
+            // One figure for every writer: how long the plan takes that is carried out.
+            next.minutes = plan.duration_min().ceil();
+            if Envelope::from_recording(self.recording, &self.case.model.output, &self.case.model.roles).drive_alone {
+                let (en, zh) = describe_drive_experiment(&next.effect);
+                (next.statement, next.statement_zh) = (en.to_owned(), Some(zh));
+            }
+        }
         diagnosis.summary = match &withdrawn {
             Some(gone) => summary::describe_withdrawal(&gone.found, gone.among_fitted, gone.errors, &diagnosis.unit),
             None => summary::summarise_diagnosis(&diagnosis),
@@ -116,6 +131,7 @@ impl EvidenceReport<'_, '_> {
             noise_floor: self.ordinary,
             before: quality(&self.inputs.simulated),
             after: quality(&self.answer.after),
+            ceiling: None,
         }
     }
 
@@ -198,9 +214,10 @@ impl EvidenceReport<'_, '_> {
     }
 
     /// One region for each name, the largest share first.
-    fn locate_regions(&self) -> Vec<Region> {
+    fn locate_regions(&self, parts: &[Part]) -> Vec<Region> {
         let rows = self.inputs.rows;
-        let whole: f64 = sum_contributions(&self.answer.remaining, rows).iter().map(|x| x * x).sum();
+        // Contributions of two signs would cancel in a sum: a share is one of all squares.
+        let whole: f64 = self.answer.remaining.iter().flat_map(|(_, x)| x).map(|x| x * x).sum();
         let size = compute_usual_size(&sum_contributions(&self.answer.contributions, rows));
         let places = PlaceSearch::new(self.recording, &self.case.model.output);
         let mut all: Vec<Region> = Vec::new();
@@ -218,7 +235,10 @@ impl EvidenceReport<'_, '_> {
                 effect: name.clone(),
                 share: over(&squares) / whole.max(f64::MIN_POSITIVE),
                 mean: over(own) / count_to_f64(inside.max(1)),
-                conditions: places.find_conditions(&active),
+                both_signs: measure_both_signs(own, &active),
+                conditions: self
+                    .find_place_of_law(name, parts, &active)
+                    .unwrap_or_else(|| places.find_conditions(&active)),
                 spans: list_spans(self.inputs.scene, &active),
                 onset: None,
             });
@@ -226,6 +246,18 @@ impl EvidenceReport<'_, '_> {
         all.retain(|region| !region.spans.is_empty());
         all.sort_by(|a, b| b.share.total_cmp(&a.share));
         all
+    }
+
+    /// The place of a law that is written with one, such as an operation: nothing else is told of it, as long as it is there that
+    /// its contribution acts.
+    fn find_place_of_law(&self, name: &str, parts: &[Part], active: &[bool]) -> Option<Vec<Condition>> {
+        let part = parts.iter().find(|part| part.label() == name)?;
+        let (column, word) = part.effect_and_form()?.1.place?;
+        let words = self.recording.find_words(&column)?;
+        let acts = || (0..active.len()).filter(|row| active[*row]);
+        let inside = acts().filter(|row| words.get(*row) == Some(word.as_str())).count();
+        let all = count_to_f64(acts().count().max(1));
+        (count_to_f64(inside) > ACTS_IN_PLACE * all).then(|| vec![Condition::Equals { column, words: vec![word] }])
     }
 
     fn build_rows(&self) -> Rows {

@@ -6,6 +6,9 @@ use std::collections::BTreeMap;
 /// The experiment of this kind; the ordinary work, twice, where only a measurement or a look is asked for.
 #[must_use]
 pub fn list_moves(kind: &str, e: &Envelope) -> Vec<Move> {
+    if e.drive_alone {
+        return list_drive_moves(kind, e);
+    }
     match kind {
         "no_load_power" | "windage" => repeat_moves(&build_idle_steps(e, 60.0)),
         "iron_loss" | "field_weakening" => [repeat_moves(&build_idle_steps(e, 45.0)), build_coast_down(e)].concat(),
@@ -37,6 +40,24 @@ pub fn list_moves(kind: &str, e: &Envelope) -> Vec<Move> {
         "screw_growth" => (0..40).flat_map(|_| build_reversal(e, 0.6, 30.0)).collect(),
         "ambient_drift" => vec![with_instruction(build_standstill(12.0 * 3600.0), OVERNIGHT)],
         _ => repeat_moves(&build_ordinary_work(e)),
+    }
+}
+
+/// The experiment where there is neither a spindle nor a cut.
+fn list_drive_moves(kind: &str, e: &Envelope) -> Vec<Move> {
+    match kind {
+        "clock_lag" | "meter_window" | "axis_inertia" | "regeneration" | "engagement_timing" => {
+            repeat_moves(&build_rapid_moves(e))
+        }
+        "stribeck" | "dry_friction" | "viscous_friction" | "axis_friction" | "direction_asymmetry" => {
+            repeat_moves(&build_axis_steps(e, &[0.01, 0.03, 0.1, 0.3, 1.0], 8.0))
+        }
+        "bearing_warm_up" | "preload_growth" | "zero_drift" | "ambient_drift" => {
+            let rest = build_move("axis", 60.0, &[(e.axis_column.as_str(), 0.0)]);
+            let work = (0..30).flat_map(|_| build_reversal(e, 0.6, 10.0));
+            repeat_moves(&std::iter::once(rest.clone()).chain(work).chain([rest]).collect::<Vec<_>>())
+        }
+        _ => repeat_moves(&build_axis_steps(e, &[0.2, 0.5, 1.0], 10.0)),
     }
 }
 
@@ -79,6 +100,12 @@ fn round_command(x: f64) -> f64 {
 #[must_use]
 pub fn build_standstill(seconds: f64) -> Move {
     build_move("standstill", seconds, &[("spindle_programmed_rpm", 0.0), ("engaged", 0.0)])
+}
+
+/// What a plan begins and ends with: the drives on, nothing moves.
+#[must_use]
+pub fn build_rest(e: &Envelope, seconds: f64) -> Move {
+    if e.drive_alone { build_move("standstill", seconds, &[(&e.axis_column, 0.0)]) } else { build_standstill(seconds) }
 }
 
 fn build_idle(speed_rpm: f64, seconds: f64) -> Move {
