@@ -82,7 +82,7 @@ pub(super) fn diagnose_recordings(arguments: DiagnoseArguments) -> CommandResult
     let mut outputs = collect_outputs(&arguments);
     if let Some(LongInput { whole, rows }) = long {
         outputs
-            .write_rows(&diagnosis.rows.expand(&rows, whole.count_rows()), &diagnosis, &whole)
+            .write_rows(&diagnosis.rows.expand_rows(&rows, whole.count_rows()), &diagnosis, &whole)
             .map_err(CannotRun::from_error)?;
         outputs.rows = None;
     }
@@ -100,7 +100,7 @@ struct LongInput {
 /// Of a long recording the rows that are compared; the whole is kept only where its rows are to be written.
 fn thin_input(mut given: InputRecordings, writes_rows: bool) -> (InputRecordings, Option<LongInput>) {
     let Some(thinned) = twin::thin_recording(&given.recording) else { return (given, None) };
-    given.warnings.push(thinned.describe(given.recording.count_rows()));
+    given.warnings.push(thinned.describe_thinning(given.recording.count_rows()));
     let whole = std::mem::replace(&mut given.recording, thinned.recording);
     (given, writes_rows.then_some(LongInput { whole, rows: thinned.rows }))
 }

@@ -222,7 +222,7 @@ fn run_job(job: &DiagnosisJob) -> Result<(history::Diagnosis, Vec<String>), Stri
     tell(Stage::Reading, 0)?;
     let Compared { model, mut recording, mut reading, from_ns, to_ns } = read_input(job)?;
     if let Some(thinned) = twin::thin_recording(&recording) {
-        reading.push(thinned.describe(recording.count_rows()));
+        reading.push(thinned.describe_thinning(recording.count_rows()));
         recording = thinned.recording;
     }
     tell(Stage::Comparing, recording.count_rows())?;

@@ -260,7 +260,7 @@ mod tests {
     use std::fmt::Write as _;
 
     /// A file of a run of this many rows, `at` seconds after eight o'clock where it tells the time of day.
-    fn file(name: &str, run: &str, at: Option<u32>, seed: u32) -> Recording {
+    fn build_file(name: &str, run: &str, at: Option<u32>, seed: u32) -> Recording {
         let mut text = String::from(if at.is_some() { "time_utc,run,p_w\n" } else { "time_s,run,p_w\n" });
         for row in 0..30_u32 {
             let power = f64::from((row * 7919 + seed * 104_729) % 1009) / 10.0;
@@ -274,7 +274,7 @@ mod tests {
     }
 
     /// Every order of three recordings.
-    fn permute(all: &[Recording; 3]) -> Vec<Vec<Recording>> {
+    fn permute_recordings(all: &[Recording; 3]) -> Vec<Vec<Recording>> {
         let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
         orders.map(|order| order.map(|index| all[index].clone()).to_vec()).to_vec()
     }
@@ -283,9 +283,12 @@ mod tests {
     fn no_order_of_the_files_changes_anything() {
         for clock in [Some(60), None] {
             let at = |number: u32| clock.map(|step| step * number);
-            let files =
-                [file("part10.csv", "c", at(9), 1), file("part2.csv", "b", at(5), 2), file("part1.csv", "a", at(1), 3)];
-            let results: Vec<(Recording, Vec<Bilingual>)> = permute(&files)
+            let files = [
+                build_file("part10.csv", "c", at(9), 1),
+                build_file("part2.csv", "b", at(5), 2),
+                build_file("part1.csv", "a", at(1), 3),
+            ];
+            let results: Vec<(Recording, Vec<Bilingual>)> = permute_recordings(&files)
                 .into_iter()
                 .map(|order| {
                     let ordered = order_recordings(order, Copies::CountOnce);
@@ -301,19 +304,19 @@ mod tests {
 
     #[test]
     fn a_copy_counts_once_under_whatever_name_and_time() {
-        let first = file("a.csv", "1", Some(0), 1);
-        for copy in [file("b.csv", "1", Some(0), 1), file("b.csv", "7", Some(600), 1)] {
+        let first = build_file("a.csv", "1", Some(0), 1);
+        for copy in [build_file("b.csv", "1", Some(0), 1), build_file("b.csv", "7", Some(600), 1)] {
             let ordered = order_recordings(vec![copy, first.clone()], Copies::CountOnce);
             assert_eq!(ordered.recordings.iter().map(Recording::count_rows).sum::<usize>(), 30);
             assert!(ordered.remarks.iter().any(|remark| remark.en.contains("copy of run 1 of a.csv (30 rows)")));
         }
-        let other = order_recordings(vec![file("b.csv", "1", Some(600), 2), first], Copies::CountOnce);
+        let other = order_recordings(vec![build_file("b.csv", "1", Some(600), 2), first], Copies::CountOnce);
         assert_eq!(other.recordings.iter().map(Recording::count_rows).sum::<usize>(), 60);
     }
 
     #[test]
     fn rows_that_two_files_share_count_once() {
-        let whole = file("a.csv", "1", Some(0), 1);
+        let whole = build_file("a.csv", "1", Some(0), 1);
         let tail = whole.take_rows(&(20..30).collect::<Vec<_>>());
         let head = whole.take_rows(&(0..25).collect::<Vec<_>>());
         assert_eq!((tail.time_s[0], tail.start_ns), (0.0, whole.start_ns.map(|ns| ns + 20_000_000_000)));

@@ -220,7 +220,7 @@ pub struct Diagnosis {
 impl Rows {
     /// The rows of the whole recording, of which these stand at `kept`; nothing was computed for the others.
     #[must_use]
-    pub fn expand(&self, kept: &[usize], whole: usize) -> Self {
+    pub fn expand_rows(&self, kept: &[usize], whole: usize) -> Self {
         let spread = |values: &[Option<f64>]| {
             let mut all = vec![None; whole];
             kept.iter().zip(values).for_each(|(row, value)| all[*row] = *value);

@@ -1,7 +1,7 @@
 //! What must not change an answer: a cell that is empty, a recording without noise.
 
 use crate::diagnosis::Verdict;
-use crate::{Diagnosis, Model, diagnose_recording, parse_model};
+use crate::{Diagnosis, diagnose_recording, parse_model};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -32,7 +32,7 @@ const RUNS: usize = 8;
 const ROWS: usize = 60;
 
 /// A healthy mill: its cells, row by row.
-fn mill(noise_w: f64, seed: u64) -> Vec<Vec<String>> {
+fn build_mill(noise_w: f64, seed: u64) -> Vec<Vec<String>> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let mut normal = move || -> f64 { StandardNormal.sample(&mut rng) };
     let mut rows = Vec::new();
@@ -69,7 +69,7 @@ fn mill(noise_w: f64, seed: u64) -> Vec<Vec<String>> {
     rows
 }
 
-fn read(rows: &[Vec<String>]) -> Recording {
+fn read_cells(rows: &[Vec<String>]) -> Recording {
     let mut text = COLUMNS.join(",") + "\n";
     rows.iter().for_each(|row| writeln!(text, "{}", row.join(",")).expect("a string takes it"));
     let read = read_csv(text.as_bytes(), "mill.csv").expect("readable");
@@ -77,20 +77,16 @@ fn read(rows: &[Vec<String>]) -> Recording {
     read.recording
 }
 
-fn model(text: &str) -> Model {
-    parse_model(text).expect("a model")
-}
-
-fn diagnose(recording: &Recording, text: &str) -> Diagnosis {
-    diagnose_recording(recording, &model(text), 1).expect("usable")
+fn diagnose_under(recording: &Recording, text: &str) -> Diagnosis {
+    diagnose_recording(recording, &parse_model(text).expect("a model"), 1).expect("usable")
 }
 
 /// Empties these cells of a column of a healthy mill; what is told then.
 fn diagnose_without(column: &str, rows: &[usize], seed: u64) -> Diagnosis {
     let at = COLUMNS.iter().position(|name| *name == column).expect("a column");
-    let mut cells = mill(25.0, seed);
+    let mut cells = build_mill(25.0, seed);
     rows.iter().for_each(|row| cells[*row][at].clear());
-    diagnose(&read(&cells), MILL)
+    diagnose_under(&read_cells(&cells), MILL)
 }
 
 /// The columns whose cells may be empty: all but time and output.
@@ -143,12 +139,12 @@ fn a_recording_without_noise_is_compared_like_any_other() {
             let (speed, on) = ([800.0, 1200.0, 1600.0, 2000.0][(row * 7 % 11 % 4) as usize], row / 9 % 2);
             writeln!(text, "{row},{},{speed},{on},{:.2}", row / 40, law(speed, on)).expect("a string takes it");
         }
-        diagnose(&read_csv(text.as_bytes(), "exact.csv").expect("readable").recording, spindle)
+        diagnose_under(&read_csv(text.as_bytes(), "exact.csv").expect("readable").recording, spindle)
     };
     let same = exact(|speed, _| 120.0 + 0.22 * speed);
     assert_eq!(same.verdict, Verdict::NoMismatch, "{}", same.summary.en);
     let pump = exact(|speed, on| 120.0 + 0.22 * speed + 150.0 * f64::from(on));
     assert!(pump.missing.iter().any(|missing| missing.effect == "auxiliary_switch"), "{}", pump.summary.en);
-    let mill = diagnose(&read(&mill(0.0, 1)), MILL);
+    let mill = diagnose_under(&read_cells(&build_mill(0.0, 1)), MILL);
     assert_eq!(mill.verdict, Verdict::NoMismatch, "{}", mill.summary.en);
 }

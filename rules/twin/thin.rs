@@ -50,7 +50,7 @@ pub fn thin_recording(whole: &Recording) -> Option<ThinnedRecording> {
 impl ThinnedRecording {
     /// What a reader of the report has to know.
     #[must_use]
-    pub fn describe(&self, whole: usize) -> Bilingual {
+    pub fn describe_thinning(&self, whole: usize) -> Bilingual {
         let (every, kept) = (self.every, self.rows.len());
         Bilingual::new(
             format!("{whole} rows, of each run one in {every} compared ({kept} rows)"),
@@ -77,7 +77,10 @@ mod tests {
         assert_eq!(thinned.recording.list_runs().len(), 2);
         assert_eq!(thinned.recording.columns().len(), 3);
         let minutes = thinned.recording.find_numbers("cutting_time_min").and_then(|minutes| minutes.get(10));
-        assert_eq!(minutes, Some(0.5), "thirty seconds in the cut at the eleventh row");
+        assert!(
+            minutes.is_some_and(|it| (it - 0.5).abs() < 1e-9),
+            "thirty seconds in the cut at the eleventh row: {minutes:?}"
+        );
         assert!(thin_recording(&thinned.recording).is_none());
     }
 }

@@ -263,9 +263,7 @@ function experiment(found, d, done) {
       : d.next_experiment.statement);
   const minutes = d.next_experiment?.minutes;
   if (!statement && !steps.length) return [];
-  const title = minutes
-    ? `${t("experiment")} (${t("about", `${number(minutes)} ${t("min")}`)})`
-    : t("experiment");
+  const title = minutes ? `${t("experiment")} (${t("about", `${number(minutes)} ${t("min")}`)})` : t("experiment");
   const list = steps.length ? steps : [statement];
   const tick = list.map((text, at) => step(`${found.key}#${at}`, text, done));
   const listed = (all, start) =>
@@ -281,10 +279,7 @@ function experiment(found, d, done) {
     statement && steps.length ? make("p", "", statement) : null,
     listed(tick.slice(0, STEPS_IN_SIGHT), 1),
     rest.length
-      ? make("details", "", [
-          make("summary", "", t("more_steps", rest.length)),
-          listed(rest, STEPS_IN_SIGHT + 1),
-        ])
+      ? make("details", "", [make("summary", "", t("more_steps", rest.length)), listed(rest, STEPS_IN_SIGHT + 1)])
       : null,
   ].filter(Boolean);
 }

@@ -43,7 +43,10 @@ export function mount(root, context) {
   const asking = new Asking(context, () => setTimeout(() => read(), 1500));
   const brought = new Brought(context);
   root.append(
-    make("div", "columns", [card(t("twin_now"), [verdict, facts, before], "ages"), card(t("twin_watched"), regimes, "ages")]),
+    make("div", "columns", [
+      card(t("twin_now"), [verdict, facts, before], "ages"),
+      card(t("twin_watched"), regimes, "ages"),
+    ]),
     card("", [
       make("div", "head", [make("h2", "", t("twin_figure")), ranges]),
       make(

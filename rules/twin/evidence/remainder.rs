@@ -60,7 +60,7 @@ impl EvidenceReport<'_, '_> {
         told
     }
 
-    fn unit(&self) -> &'static str {
+    fn output_unit(&self) -> &'static str {
         crate::diagnosis::find_output_unit(self.inputs.scene.output_name())
     }
 
@@ -84,7 +84,7 @@ impl EvidenceReport<'_, '_> {
         }
         let share = (off * off - on * on).abs() / (off * off + on * on);
         let [off, on, low, high] = [off, on, low, high].map(format_short_number);
-        let unit = self.unit();
+        let unit = self.output_unit();
         Some(Finding {
             share,
             text: Bilingual::new(
@@ -124,7 +124,7 @@ impl EvidenceReport<'_, '_> {
             return None;
         }
         let size = format_short_number((product / count_to_f64(left.len())).max(0.0).sqrt());
-        let (unit, percent) = (self.unit(), 100.0 * share);
+        let (unit, percent) = (self.output_unit(), 100.0 * share);
         Some(Finding {
             share,
             text: Bilingual::new(
@@ -151,7 +151,7 @@ impl EvidenceReport<'_, '_> {
         if slow < SLOW_NOISE * within.sqrt() || slow < SLOW_OUTPUT * self.comparison.size {
             return None;
         }
-        let (slow, unit) = (format_short_number(slow), self.unit());
+        let (slow, unit) = (format_short_number(slow), self.output_unit());
         Some(Bilingual::new(
             format!("{slow} {unit} of slow change that I cannot tell from noise"),
             format!("{slow} {unit}的缓慢变化，无法与噪声区分"),

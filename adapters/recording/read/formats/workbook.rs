@@ -50,6 +50,7 @@ fn read_sheet(book: &mut Book, chosen: &str, input: &Input) -> Result<MemoryTabl
                 sheet.put_cell(cell.get_position(), convert_cell(&Data::from(cell.get_value().clone())));
                 sheet.check_size(chosen, input)?;
             }
+            drop(cells);
             note_formulas(book, chosen, &sheet, &mut notes);
         }
         Sheets::Xlsb(book) => {
