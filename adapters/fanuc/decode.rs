@@ -106,8 +106,19 @@ pub fn read_answer(item: FocasItem, dialect: impl Into<Dialect>, data: &[u8]) ->
         FocasItem::ToolGroup => tool_group(at)?,
         FocasItem::ToolLife(group) => records::read_tool_life(at, group)?,
     };
-    whole.check_end()?;
+    if !has_longer_form(item) {
+        whole.check_end()?;
+    }
     Ok(answer)
+}
+
+/// Single values whose beginning is their meaning: controls send more bytes behind them, and the vendor's library (1.0.5) reads the
+/// beginning all the same. An answer that is too short is refused as ever.
+fn has_longer_form(item: FocasItem) -> bool {
+    matches!(
+        item,
+        FocasItem::Feed | FocasItem::SpindleSpeed | FocasItem::Sequence | FocasItem::Program | FocasItem::ModalWord(_)
+    )
 }
 
 /// Which byte is which: what `libfwlib32` 1.0.5 makes of `000000fa 01020304` is flag 2 and 4 places.
@@ -238,4 +249,38 @@ fn read_parameter(
         values.truncate(1);
     }
     Ok(FocasAnswer::Data { kind, values })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::item::BlockWord;
+    use super::*;
+
+    /// Controls send more behind these values than is known; the beginning is their meaning. One byte too few is refused.
+    #[test]
+    fn more_bytes_behind_a_value_change_nothing() {
+        let number = [0, 0, 4, 0xB0, 0, 10, 0, 0];
+        for item in [
+            FocasItem::Feed,
+            FocasItem::SpindleSpeed,
+            FocasItem::Sequence,
+            FocasItem::Program,
+            FocasItem::ModalWord(BlockWord::F),
+        ] {
+            let whole = if item == FocasItem::Sequence { &number[..4] } else { &number[..] };
+            let generation = Generation::from_version(4);
+            let plain = read_answer(item, generation, whole).expect("whole");
+            for more in 1..=24 {
+                let longer = [whole, &vec![0xAA; more]].concat();
+                assert_eq!(read_answer(item, generation, &longer), Ok(plain.clone()), "{item:?} with {more} more");
+            }
+            for fewer in 0..whole.len() {
+                assert!(read_answer(item, generation, &whole[..fewer]).is_err(), "{item:?} with {fewer} bytes");
+            }
+        }
+        assert_eq!(
+            read_answer(FocasItem::Feed, Generation::from_version(4), &number),
+            Ok(FocasAnswer::Number(Some(1200.0)))
+        );
+    }
 }

@@ -1,7 +1,8 @@
 //! The one connection to a controller, shared by everything that reads or writes it: opened when it is needed, given
-//! up when it breaks, never open twice. A controller that answered before and now cannot be reached, or whose computer
-//! refuses connections, is switched off, which is a state and not a fault. One that accepts and is silent, or closes what it
-//! has accepted, is none of that: it gives no answer.
+//! up when it breaks, never open twice. A controller that answered before and whose computer now refuses connections is
+//! starting or off, which is a state and not a fault. One that cannot be reached, that accepts and is silent, or that closes
+//! what it has accepted gives no answer: a cable or a switch that failed looks the same as a machine that is off, and only a
+//! meter tells them apart.
 
 use super::allow_list::AllowList;
 use super::answer::{FocasItemError, FocasItemResult, Refusal};
@@ -342,9 +343,8 @@ impl FanucConnection {
     fn not_opened(&mut self, error: &FocasError, now_ns: TimeNs) -> SourceError {
         self.counts.refused += 1;
         let lost_ns = *self.lost_ns.get_or_insert(now_ns);
-        // Silence is no evidence: a control that accepts and says nothing may be cutting.
+        // Silence is no evidence: a control that cannot be reached, or that accepts and says nothing, may be cutting.
         let off = match error {
-            FocasError::Unreachable(_) => true,
             FocasError::NobodyThere(_) => now_ns - lost_ns < STARTING_NS,
             _ => false,
         };

@@ -24,6 +24,12 @@ pub fn ladder_signals(path: u8) -> Stretch {
     Stretch::from_byte_range(Area::G, find_signal_address(FIRST_LADDER_BYTE, path), 25)
 }
 
+/// From the ladder to the control: G096, the rapid override in steps of one percent.
+#[must_use]
+pub fn rapid_steps(path: u8) -> Stretch {
+    Stretch::from_byte_range(Area::G, find_signal_address(96, path), 1)
+}
+
 /// Address of the byte with which [`ladder_signals`] begins on path 1.
 pub const FIRST_LADDER_BYTE: u16 = 6;
 
@@ -44,7 +50,7 @@ pub const PER_REVOLUTION: u8 = 1;
 pub const ALARMS: FocasItem = FocasItem::Alarms(8);
 
 /// What changes quickly on every path.
-fn list_quick_items(path: u8) -> [FocasItem; 17] {
+fn list_quick_items(path: u8) -> [FocasItem; 18] {
     [
         FocasItem::Status,
         // Before what the vendor's call for the positions answers besides.
@@ -64,6 +70,7 @@ fn list_quick_items(path: u8) -> [FocasItem; 17] {
         FEED_GROUP,
         FocasItem::Pmc(control_signals(path)),
         FocasItem::Pmc(ladder_signals(path)),
+        FocasItem::Pmc(rapid_steps(path)),
     ]
 }
 

@@ -16,13 +16,16 @@ pub type OrAbsence<T> = Result<T, Absence>;
 pub struct Signals {
     control: OrAbsence<[u8; 5]>,
     ladder: OrAbsence<[u8; 25]>,
+    /// Byte G096: the rapid override in steps of one percent, and whether it is in force.
+    rapid_steps: OrAbsence<u8>,
 }
 
 impl Signals {
     /// From the two stretches, where they could be read.
     #[must_use]
-    pub fn new(control: OrAbsence<&[i32]>, ladder: OrAbsence<&[i32]>) -> Self {
-        Self { control: control.and_then(convert_bytes), ladder: ladder.and_then(convert_bytes) }
+    pub fn new(control: OrAbsence<&[i32]>, ladder: OrAbsence<&[i32]>, rapid_steps: OrAbsence<&[i32]>) -> Self {
+        let rapid_steps = rapid_steps.and_then(convert_bytes).map(|[byte]: [u8; 1]| byte);
+        Self { control: control.and_then(convert_bytes), ladder: ladder.and_then(convert_bytes), rapid_steps }
     }
 
     fn read_control_bit(&self, byte: usize, bit: u8) -> OrAbsence<bool> {
@@ -121,12 +124,21 @@ impl Signals {
         Ok(f64::from(pct.percent()))
     }
 
-    /// G014.0 and .1, ROV1 and ROV2, or the one-percent steps of G096 where the machine uses them, which are not read: the
-    /// rapid override in %. F0 is a speed and no share, so it is *not supported*.
+    /// The rapid override in %. G096.7 HROV says whether the steps of one percent count, G096.0 to .6 *HROV0 to *HROV6 (inverted);
+    /// else G014.0 and .1, ROV1 and ROV2. F0 is a speed and no share, so it is *not supported*. A control without G096 has no
+    /// such steps; one that refuses the byte for now leaves open which of the two count.
     ///
     /// # Errors
     /// As above.
     pub fn rapid_override(&self) -> OrAbsence<f64> {
+        let steps = match self.rapid_steps {
+            Err(Absence::NotSupported) => 0,
+            steps => steps?,
+        };
+        if steps & 0x80 != 0 {
+            let percent = !steps & 0x7F;
+            return if percent <= 100 { Ok(f64::from(percent)) } else { Err(Absence::OutOfRange) };
+        }
         match self.read_ladder_byte(14)? & 0b11 {
             0b00 => Ok(100.0),
             0b01 => Ok(50.0),
@@ -219,7 +231,7 @@ mod tests {
             let place = if *letter == 'F' { &mut control[*byte] } else { &mut ladder[byte - 6] };
             *place = i32::from(*value);
         }
-        Signals::new(Ok(&control), Ok(&ladder))
+        Signals::new(Ok(&control), Ok(&ladder), Ok(&[0]))
     }
 
     #[test]
@@ -253,7 +265,7 @@ mod tests {
         assert_eq!(signals(&[('G', 12, 0xAF), ('F', 2, 0x08)]).feed_override(false), Ok(100.0), "threading");
         assert_eq!(signals(&[]).spindle_override(), Ok(100.0));
         assert_eq!(
-            Signals::new(Err(Absence::Refused), Err(Absence::Refused)).feed_override(false),
+            Signals::new(Err(Absence::Refused), Err(Absence::Refused), Ok(&[0])).feed_override(false),
             Err(Absence::Refused)
         );
     }
@@ -272,6 +284,17 @@ mod tests {
         let rapid = |byte| signals(&[('G', 14, byte)]).rapid_override();
         assert_eq!([rapid(0), rapid(1), rapid(2)], [Ok(100.0), Ok(50.0), Ok(25.0)]);
         assert_eq!(rapid(3), Err(Absence::NotSupported), "F0 is a speed");
+        let with_steps = |steps: OrAbsence<i32>| {
+            let ladder = [0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+            let steps = steps.map(|byte| [byte]);
+            Signals::new(Ok(&[0; 5]), Ok(&ladder), steps.as_ref().map(|byte| &byte[..]).map_err(|why| *why))
+                .rapid_override()
+        };
+        assert_eq!([with_steps(Ok(0xE1)), with_steps(Ok(0xFF)), with_steps(Ok(0x9B))], [Ok(30.0), Ok(0.0), Ok(100.0)]);
+        assert_eq!(with_steps(Ok(0x61)), Ok(50.0), "HROV is off");
+        assert_eq!(with_steps(Ok(0x80)), Err(Absence::OutOfRange), "127 %");
+        assert_eq!(with_steps(Err(Absence::NotSupported)), Ok(50.0), "a control without them");
+        assert_eq!(with_steps(Err(Absence::Refused)), Err(Absence::Refused), "nobody knows which of them count");
         let jog = |low, high| signals(&[('G', 10, low), ('G', 11, high)]).jog_override();
         // 100.00 % is 10000 hundredths, 0x2710; inverted 0xD8EF, the low byte first.
         assert_eq!([jog(0xEF, 0xD8), jog(0xFF, 0xFF), jog(0, 0)], [Ok(100.0), Ok(0.0), Ok(0.0)]);

@@ -57,6 +57,7 @@ impl View<'_> {
         Signals::new(
             self.find_memory(poll::control_signals(self.path)),
             self.find_memory(poll::ladder_signals(self.path)),
+            self.find_memory(poll::rapid_steps(self.path)),
         )
     }
 

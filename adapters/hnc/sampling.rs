@@ -145,9 +145,10 @@ impl Sampling {
     }
 
     fn build_empty_block(&self, begin_ms: i64) -> SampleBlock {
-        let column = |path: &String| ItemColumn { path: path.clone(), values: Vec::new(), step_ms: 1.0, word: None };
+        let column =
+            |path: &String| ItemColumn { path: path.clone(), unit: None, values: Vec::new(), step_ms: 1.0, word: None };
         let columns = self.names.iter().map(column).collect();
-        SampleBlock { channel: "hnc".to_owned(), begin_ms, interval_ms: 1.0, instants: 0, columns }
+        SampleBlock { channel: "hnc".to_owned(), begin_ms, interval_ms: 1.0, instants: 0, columns, clock: None }
     }
 }
 

@@ -59,7 +59,7 @@ impl Link {
 /// A message that nobody asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unasked {
-    /// [`Subject::Sample`] or [`Subject::Event`].
+    /// [`Subject::Sample`], [`Subject::Event`], [`Subject::Register`] or [`Subject::Version`].
     pub subject: Subject,
     /// What stood behind the serial number in its topic.
     pub tail: String,
@@ -91,7 +91,8 @@ impl Connection {
         let fault = |error| broker_fault(link, error);
         let client = MqttClient::connect(&options).map_err(fault)?;
         let answers = [Subject::ProbeAnswer, Subject::QueryAnswer, Subject::SetAnswer];
-        let more: &[Subject] = if samples { &[Subject::Sample, Subject::Event] } else { &[] };
+        let more: &[Subject] =
+            if samples { &[Subject::Sample, Subject::Event, Subject::Register, Subject::Version] } else { &[] };
         let filters: Vec<String> =
             answers.iter().chain(more).map(|subject| subject.build_filter(&link.serial)).collect();
         client.subscribe_filters(&filters, Qos::AtMostOnce).map_err(fault)?;
@@ -208,10 +209,11 @@ impl Connection {
 
     fn keep_unasked(&mut self, message: &MqttMessage) {
         let Some((subject, tail)) = Subject::from_topic(&message.topic, &self.link.serial) else { return };
-        if !matches!(subject, Subject::Sample | Subject::Event) {
+        if !matches!(subject, Subject::Sample | Subject::Event | Subject::Register | Subject::Version) {
             return;
         }
         match self.link.encoding.parse_json(&message.payload) {
+            Ok(said) if subject == Subject::Register && !message::names_device(&said, &self.link.serial) => {}
             Ok(said) => {
                 let (tail, arrived) = (tail.to_owned(), message.arrived);
                 self.unasked.push_back(Unasked { subject, tail, arrived, message: said });

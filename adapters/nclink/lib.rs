@@ -8,7 +8,8 @@
 //! | `topic` | the topics of a device |
 //! | `message` | query and set: requests as JSON, answers as values or reasons |
 //! | `model` | the answer to a probe: data items with their paths, sample channels |
-//! | `sample` | one message of a sample channel: columns of values, their times |
+//! | `sample`, `begin_time` | one message of a sample channel: columns of values, their times |
+//! | `measured` | what a number of an item is in the unit of a channel, polled or sampled |
 //! | `map`, `own_path` | which data item feeds which channel, in which unit; what the user can have read |
 //! | `decode` | state words from the status item and from the channel's F register |
 //! | `connection` | one client at the broker: probe, query, set, by request identifier |
@@ -33,6 +34,10 @@
 //! values per instant. Which way a device names its items is seen in its model, and tried the other way round once when
 //! everything is refused.
 //!
+//! **Another model.** A device that registers itself, or tells a version of its model, is asked for its model again before a value
+//! is believed: the same node numbers may mean something else. Answers and samples in between are dropped. A device that does
+//! neither is asked once a minute.
+//!
 //! **Units.** Where the model tells the unit of an item, its number is converted; a unit that is not known costs the channel
 //! its value, with that reason. An item that another maker has put under another component is found where it is the only one
 //! of its name.
@@ -47,11 +52,13 @@
 
 mod actuator;
 pub mod address;
+mod begin_time;
 pub mod connection;
 mod decode;
 pub mod lenient_json;
 pub mod mailbox;
 mod map;
+pub mod measured;
 pub mod message;
 pub mod model;
 pub mod offset_mailbox;
@@ -65,6 +72,7 @@ mod source;
 pub mod topic;
 
 pub use actuator::NcLinkActuator;
+pub use begin_time::ForeignClock;
 pub use message::{NcLinkAnswer, Params, RequestedItem};
 pub use open::{open_address, open_sampled};
 pub use own_path::OwnPath;

@@ -92,6 +92,17 @@ pub(super) fn encode_request(id: &str, asks: &[RequestedItem]) -> Vec<u8> {
     json!({"@id": id, key: items}).to_string().into_bytes()
 }
 
+/// Does a message that is not addressed to a device name this one anywhere in it? Makers write the serial number under many names.
+pub(super) fn names_device(message: &Value, serial: &str) -> bool {
+    match message {
+        Value::String(text) => text == serial,
+        Value::Array(list) => list.iter().any(|one| names_device(one, serial)),
+        Value::Object(fields) => fields.values().any(|one| names_device(one, serial)),
+        Value::Number(number) => number.to_string() == serial,
+        _ => false,
+    }
+}
+
 /// The identifier by which an answer belongs to its request.
 pub fn find_identifier(message: &Value) -> Option<String> {
     find_text(message, &["@id", "@ID", "id@"])

@@ -6,7 +6,8 @@
 //! read = "0103532105"                      read = "CONTROLLER/VARIABLE@REG_X 12.3"
 //! ```
 
-use super::lenient_json::{parse_integer, parse_number};
+use super::lenient_json::parse_integer;
+use super::measured::ItemConversion;
 use super::message::NcLinkAnswer;
 use adapter_core::channel::Kind;
 use adapter_core::own::{OwnChannel, OwnRead};
@@ -60,7 +61,12 @@ impl OwnPath {
     ///
     /// # Errors
     /// There is no value of the kind that the channel has.
-    pub(super) fn extract_value(&self, channel: &OwnChannel, answer: Option<&NcLinkAnswer>) -> Result<Value, Absence> {
+    pub(super) fn extract_value(
+        &self,
+        channel: &OwnChannel,
+        answer: Option<&NcLinkAnswer>,
+        conversion: &ItemConversion<'_>,
+    ) -> Result<Value, Absence> {
         let value = match answer {
             Some(Ok(values)) => values.first().filter(|value| !value.is_null()).ok_or(Absence::NotYetRead)?,
             Some(Err(_)) => return Err(Absence::Refused),
@@ -70,11 +76,9 @@ impl OwnPath {
             let text = value.as_str().map_or_else(|| value.to_string(), |text| text.trim().to_owned());
             return Ok(Value::Text(Arc::from(text)));
         }
-        let found = match self.bit {
-            Some(bit) => parse_integer(value).map(|whole| f64::from(u8::from(whole >> bit & 1 == 1))),
-            None => parse_number(value),
-        };
-        Value::from_number(found.ok_or(Absence::OutOfRange)?)
+        let Some(bit) = self.bit else { return conversion.convert_value(value).and_then(Value::from_number) };
+        let whole = parse_integer(value).ok_or(Absence::OutOfRange)?;
+        conversion.convert_number(f64::from(u8::from(whole >> bit & 1 == 1))).and_then(Value::from_number)
     }
 }
 

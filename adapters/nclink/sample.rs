@@ -1,6 +1,8 @@
 //! One message of a sample channel: a column of values per item, and when they were true on the device's clock.
 
-use super::lenient_json::{find_field, find_list, find_text, parse_integer, parse_number};
+use super::begin_time::{BeginTime, ForeignClock, parse_begin};
+use super::lenient_json::{find_field, find_list, find_text, parse_number};
+use super::measured::{ItemConversion, UnitProblem, split_unit};
 use super::model::Model;
 use serde_json::Value;
 use thiserror::Error;
@@ -13,6 +15,9 @@ pub const VALUES_MAX: usize = 1_000_000;
 pub struct ItemColumn {
     /// Path of the item, or its name as the device writes it when the model does not know it.
     pub path: String,
+    /// The unit of its numbers: as the model tells it, else as the values themselves do. [`ItemConversion`] makes of it what a
+    /// channel wants.
+    pub unit: Option<String>,
     /// In the order of time; `None` where the device had no number. Words are not numbers.
     pub values: Vec<Option<f64>>,
     /// Time between two values, ms; 0 with fewer than two.
@@ -34,6 +39,8 @@ pub struct SampleBlock {
     pub instants: usize,
     /// In the order of the message.
     pub columns: Vec<ItemColumn>,
+    /// How the device told `begin_ms`, where that is not as the standard has it.
+    pub clock: Option<ForeignClock>,
 }
 
 /// Why a message of a sample channel makes no sense.
@@ -42,8 +49,8 @@ pub enum SampleError {
     /// It does not say when its first instant was.
     #[error("there is no \"beginTime\" in it")]
     NoBegin,
-    /// The time of its first instant is no whole number; the value as JSON.
-    #[error("{0} is no time in milliseconds")]
+    /// The time of its first instant cannot be understood; the value as JSON.
+    #[error("\"beginTime\" is {0}, which is no time in milliseconds since 1970")]
     BadBegin(String),
     /// Neither the message nor the model says how far apart the instants are.
     #[error("there is no interval in it, nor in the model")]
@@ -71,7 +78,8 @@ impl SampleBlock {
         let known = model.samples.iter().find(|known| known.id == channel || known.id == tail);
         let data = find_list(message, &["data"]);
         let begin = find_field(message, &["beginTime", "begintime"]).ok_or(SampleError::NoBegin)?;
-        let begin_ms = parse_integer(begin).ok_or_else(|| SampleError::BadBegin(begin.to_string()))?;
+        let BeginTime { ms: begin_ms, clock } =
+            parse_begin(begin).ok_or_else(|| SampleError::BadBegin(begin.to_string().chars().take(60).collect()))?;
         let interval = find_field(message, &["interval", "sampleInterval"]).and_then(parse_number);
         let interval_ms = interval.or(known.map(|known| known.interval_ms)).filter(|ms| *ms > 0.0);
         let interval_ms = interval_ms.ok_or(SampleError::NoInterval)?;
@@ -82,12 +90,13 @@ impl SampleBlock {
             return Err(SampleError::TooMany(total));
         }
         let instants = sizes.map(<[Value]>::len).max().unwrap_or(0);
-        let path = |name: &String| model.find_item(name).map_or_else(|| name.clone(), |item| item.path.clone());
-        let columns = data
-            .iter()
-            .zip(&names)
-            .map(|(data, name)| build_column(find_list(data, &["data"]), path(name), interval_ms));
-        Ok(Self { channel, begin_ms, interval_ms, instants, columns: columns.collect() })
+        let column = |(data, name): (&Value, &String)| {
+            let item = model.find_item(name);
+            let path = item.map_or_else(|| name.clone(), |item| item.path.clone());
+            build_column(find_list(data, &["data"]), path, item.and_then(|item| item.unit.clone()), interval_ms)
+        };
+        let columns = data.iter().zip(&names).map(column).collect();
+        Ok(Self { channel, begin_ms, interval_ms, instants, columns, clock })
     }
 
     /// When the next message of the channel must begin if nothing is lost, ms.
@@ -114,22 +123,54 @@ fn parse_name(value: &Value) -> Option<String> {
 
 /// A value may itself be a list: several values within one interval. `[]` is none.
 #[expect(clippy::cast_precision_loss, reason = "a message holds at most a million values")]
-fn build_column(data: &[Value], path: String, interval_ms: f64) -> ItemColumn {
-    let mut values = Vec::with_capacity(data.len());
-    let mut word = None;
+fn build_column(data: &[Value], path: String, unit: Option<String>, interval_ms: f64) -> ItemColumn {
+    let mut column = ItemColumn { path, unit, values: Vec::with_capacity(data.len()), step_ms: 0.0, word: None };
     for value in data {
         match value {
-            Value::Array(several) if several.is_empty() => values.push(None),
-            Value::Array(several) => values.extend(several.iter().map(parse_number)),
-            Value::String(text) if parse_number(value).is_none() => {
-                word = Some(text.clone());
-                values.push(None);
-            }
-            other => values.push(parse_number(other)),
+            Value::Array(several) if several.is_empty() => column.values.push(None),
+            Value::Array(several) => several.iter().for_each(|value| column.push_value(value)),
+            other => column.push_value(other),
         }
     }
-    let per_instant = if data.is_empty() { 1.0 } else { values.len() as f64 / data.len() as f64 };
-    ItemColumn { path, step_ms: interval_ms / per_instant.max(1.0), values, word }
+    let per_instant = if data.is_empty() { 1.0 } else { column.values.len() as f64 / data.len() as f64 };
+    column.step_ms = interval_ms / per_instant.max(1.0);
+    column
+}
+
+impl ItemColumn {
+    /// Its numbers in the unit that a channel wants, `None` where there is none.
+    ///
+    /// # Errors
+    /// Their unit does not fit.
+    pub fn convert_values(&self, wanted: &str) -> Result<Vec<Option<f64>>, UnitProblem> {
+        let conversion = ItemConversion::new(self.unit.as_deref(), wanted);
+        match conversion.problem() {
+            Some(problem) => Err(problem),
+            None => Ok(self.values.iter().map(|value| conversion.convert_number((*value)?).ok()).collect()),
+        }
+    }
+
+    /// A number in the column's unit. The first text with a unit of its own tells that of a column without one.
+    fn push_value(&mut self, value: &Value) {
+        if let Value::String(text) = value
+            && parse_number(value).is_none()
+        {
+            match split_unit(text) {
+                Some((_, unit)) if self.values.iter().all(Option::is_none) && self.unit.is_none() => {
+                    self.unit = Some(unit.to_owned());
+                }
+                Some(_) => {}
+                None => self.word = Some(text.clone()),
+            }
+        }
+        let unit = self.unit.as_deref();
+        // Without a unit a number stands for itself, and a text with one for none.
+        let number = match unit {
+            Some(unit) => ItemConversion::new(Some(unit), unit).convert_value(value).ok(),
+            None => parse_number(value),
+        };
+        self.values.push(number.or_else(|| parse_number(value)));
+    }
 }
 
 #[cfg(test)]
@@ -163,7 +204,7 @@ mod tests {
         assert_eq!((block.channel.as_str(), block.interval_ms), ("s1", 1.0));
         assert_eq!(
             block.columns[1],
-            ItemColumn { path: "FEED_SPEED".to_owned(), values: vec![None; 4], step_ms: 1.0, word: None }
+            ItemColumn { path: "FEED_SPEED".to_owned(), unit: None, values: vec![None; 4], step_ms: 1.0, word: None }
         );
     }
 

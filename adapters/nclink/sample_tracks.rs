@@ -1,8 +1,9 @@
 //! What sample channels and events have brought: how much, and whether a millisecond is missing.
 
+use super::begin_time::ForeignClock;
 use super::decode;
 use super::sample::SampleBlock;
-use adapter_core::driver::Fact;
+use adapter_core::driver::{Fact, SourceProblem};
 use adapter_core::integer::widen_to_u64;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -35,6 +36,10 @@ pub struct SampleTracks {
     lost: u64,
     nonsense: u64,
     why: Option<String>,
+    /// Is `why` that of the last message?
+    why_stands: bool,
+    /// How the device tells times, where that is not as the standard has it.
+    clock: Option<ForeignClock>,
 }
 
 impl SampleTracks {
@@ -75,6 +80,21 @@ impl SampleTracks {
         facts
     }
 
+    /// What is wrong with what the device sends by itself at the moment.
+    pub(super) fn list_problems(&self) -> Vec<SourceProblem> {
+        let unusable = self.why.as_ref().filter(|_| self.why_stands).map(|why| SourceProblem {
+            what: format!("what the device sends on its sample channels cannot be used: {why}"),
+            next: "Correct the sample channel in the device's model or adapter; what is polled goes on without it"
+                .to_owned(),
+        });
+        let clock = self.clock.map(|clock| SourceProblem {
+            what: format!("the device tells the times of its samples {}, not in milliseconds", clock.describe_form()),
+            next: "They are converted; the standard (GB/T 41970) has milliseconds since 1970 as \"beginTime\""
+                .to_owned(),
+        });
+        unusable.into_iter().chain(clock).collect()
+    }
+
     pub(super) fn lost_messages(&mut self, lost: u64) {
         self.lost = lost;
     }
@@ -82,6 +102,7 @@ impl SampleTracks {
     pub(super) fn record_nonsense(&mut self, why: String) {
         self.nonsense += 1;
         self.why = Some(why);
+        self.why_stands = true;
     }
 
     pub(super) fn record_event(&mut self, message: &Value) {
@@ -99,6 +120,7 @@ impl SampleTracks {
         if self.channels.len() >= CHANNELS_MAX && !self.channels.contains_key(&block.channel) {
             return self.record_nonsense(format!("more than {CHANNELS_MAX} sample channels"));
         }
+        (self.why_stands, self.clock) = (false, block.clock);
         self.channels.entry(block.channel.clone()).or_default().record_block(block);
     }
 }
@@ -133,7 +155,7 @@ mod tests {
     use serde_json::json;
 
     fn block(begin_ms: i64, instants: usize) -> SampleBlock {
-        SampleBlock { channel: "s".to_owned(), begin_ms, interval_ms: 1.0, instants, columns: Vec::new() }
+        SampleBlock { channel: "s".to_owned(), begin_ms, interval_ms: 1.0, instants, columns: Vec::new(), clock: None }
     }
 
     #[test]

@@ -10,7 +10,7 @@ use super::sample_tracks::SampleTracks;
 use super::topic::Subject;
 use crate::address::NcLinkTarget;
 use adapter_core::channel::ChannelId;
-use adapter_core::clock::Clock;
+use adapter_core::clock::{Clock, SECOND_NS, TimeNs};
 use adapter_core::driver::{Fact, Offer, Source, SourceError, SourceProblem};
 use adapter_core::own::Own;
 use adapter_core::reading::{Reading, Stamp};
@@ -18,6 +18,11 @@ use std::time::{Duration, Instant};
 
 /// Takes whole blocks of a sample channel, with the moment of their arrival.
 pub type BlockSink = Box<dyn FnMut(&SampleBlock, Instant) + Send>;
+
+/// A device that says nothing of it may have another model all the same: it is asked so often.
+const PROBE_NS: i64 = 60 * SECOND_NS;
+/// A device that registers itself so often within one poll never comes to rest.
+const REGISTERED_MAX: usize = 3;
 
 /// Reads a device at the pace of its address. Connects at the first poll, and anew after the line broke.
 pub struct NcLinkSource {
@@ -28,6 +33,8 @@ pub struct NcLinkSource {
     own: Vec<Own<OwnPath>>,
     session: Option<NcLinkSession>,
     track: SampleTracks,
+    /// Models that were another one than before.
+    model_changes: u32,
     sink: Option<BlockSink>,
 }
 
@@ -40,8 +47,12 @@ struct NcLinkSession {
     /// Has any answer been of use? Until then the other way of naming is tried once.
     understood: bool,
     turned: bool,
-    /// It was silent: when it comes back it may be another machine.
+    /// It was silent, or registered itself: it may have another model, or be another machine.
     doubtful: bool,
+    /// Was its model another one when it was asked for again?
+    has_new_model: bool,
+    /// When its model was last asked for.
+    probed_ns: TimeNs,
 }
 
 impl NcLinkSource {
@@ -59,6 +70,7 @@ impl NcLinkSource {
             own: target.own.clone(),
             session: None,
             track: SampleTracks::default(),
+            model_changes: 0,
             sink: None,
         }
     }
@@ -83,20 +95,51 @@ impl NcLinkSource {
     fn poll(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
         let mut session = match self.session.take() {
             Some(session) => session,
-            None => NcLinkSession::open(&self.link, self.layout, &self.own)?,
+            None => NcLinkSession::open(&self.link, self.layout, &self.own, clock.now_ns())?,
         };
-        let answers = session.query_values(self.layout, &self.own, clock);
-        // What came by itself is taken in any case: a device that does not answer may still send.
-        let unasked = session.connection.take_unasked()?;
-        self.track.lost_messages(session.connection.count_lost());
-        for message in &unasked {
-            self.record_message(message, &session.model);
+        let mut outcome = Err(self.build_restless_error());
+        for _ in 0..REGISTERED_MAX {
+            let answers = session.query_values(self.layout, &self.own, clock);
+            self.model_changes += u32::from(std::mem::take(&mut session.has_new_model));
+            // What came by itself is taken in any case: a device that does not answer may still send.
+            let registered = self.record_unasked(&mut session)?;
+            if !registered {
+                outcome = answers.map(|(answers, stamp)| session.poll.append_readings(&answers, stamp, out));
+                session.doubtful = matches!(outcome, Err(SourceError::Timeout { .. }));
+                break;
+            }
+            // The answers may be those of the old model or of the new one: they are asked for again, after the model.
+            session.doubtful = true;
         }
-        let outcome = answers.map(|(answers, stamp)| session.poll.append_readings(&answers, stamp, out));
-        session.doubtful = matches!(outcome, Err(SourceError::Timeout { .. }));
         // Only a broken line needs another connection.
         self.session = (!matches!(outcome, Err(SourceError::Line { .. }))).then_some(session);
         outcome
+    }
+
+    /// Takes what came by itself. Has the device registered itself or told a version of its model? What it sent after that cannot be
+    /// read before the model is known, and is dropped.
+    fn record_unasked(&mut self, session: &mut NcLinkSession) -> Result<bool, SourceError> {
+        let unasked = session.connection.take_unasked()?;
+        self.track.lost_messages(session.connection.count_lost());
+        let mut registered = false;
+        for message in &unasked {
+            match message.subject {
+                Subject::Register | Subject::Version => registered = true,
+                Subject::Sample if registered => {
+                    self.track.record_nonsense("it came before the model that belongs to it was known".to_owned());
+                }
+                _ => self.record_message(message, &session.model),
+            }
+        }
+        Ok(registered)
+    }
+
+    fn build_restless_error(&self) -> SourceError {
+        SourceError::Decode {
+            source_name: self.link.name.clone(),
+            request: "the probe of its model".to_owned(),
+            what: "the device registers itself anew all the time: do two devices have this serial number?".to_owned(),
+        }
     }
 
     fn record_message(&mut self, message: &Unasked, model: &Model) {
@@ -116,7 +159,7 @@ impl NcLinkSource {
 }
 
 impl NcLinkSession {
-    fn open(link: &Link, layout: NcLinkLayout, own: &[Own<OwnPath>]) -> Result<Self, SourceError> {
+    fn open(link: &Link, layout: NcLinkLayout, own: &[Own<OwnPath>], probed_ns: TimeNs) -> Result<Self, SourceError> {
         let mut connection = Connection::open(link, true)?;
         let model = connection.probe_model()?;
         let by_path = model.names_by_path();
@@ -128,14 +171,31 @@ impl NcLinkSession {
                 what: format!("none of its {} data items is one that the gateway knows", model.items.len()),
             });
         }
-        Ok(Self { connection, model, poll: plan, by_path, understood: false, turned: false, doubtful: false })
+        Ok(Self {
+            connection,
+            model,
+            poll: plan,
+            by_path,
+            understood: false,
+            turned: false,
+            doubtful: false,
+            has_new_model: false,
+            probed_ns,
+        })
     }
 
-    /// Asks a device that was silent for its model again.
-    fn renew_model(&mut self, layout: NcLinkLayout, own: &[Own<OwnPath>]) -> Result<(), SourceError> {
-        self.model = self.connection.probe_model()?;
-        self.poll = NcLinkPoll::from_model(&self.model, layout, own, self.by_path);
-        self.doubtful = false;
+    /// Asks for the model again.
+    fn renew_model(&mut self, layout: NcLinkLayout, own: &[Own<OwnPath>], now_ns: TimeNs) -> Result<(), SourceError> {
+        // Until it has come nothing is believed.
+        self.doubtful = true;
+        let model = self.connection.probe_model()?;
+        (self.doubtful, self.probed_ns) = (false, now_ns);
+        if model != self.model {
+            self.model = model;
+            self.by_path = self.model.names_by_path();
+            (self.has_new_model, self.understood, self.turned) = (true, false, false);
+            self.poll = NcLinkPoll::from_model(&self.model, layout, own, self.by_path);
+        }
         Ok(())
     }
 
@@ -146,8 +206,10 @@ impl NcLinkSession {
         own: &[Own<OwnPath>],
         clock: &dyn Clock,
     ) -> Result<(Vec<Option<NcLinkAnswer>>, Stamp), SourceError> {
-        if self.doubtful {
-            self.renew_model(layout, own)?;
+        let now_ns = clock.now_ns();
+        // A clock that was set back asks, too.
+        if self.doubtful || !(0..PROBE_NS).contains(&(now_ns - self.probed_ns)) {
+            self.renew_model(layout, own, now_ns)?;
         }
         loop {
             let began_ns = clock.now_ns();
@@ -196,17 +258,19 @@ impl Source for NcLinkSource {
     fn collect_facts(&self) -> Vec<Fact> {
         let mut facts = self.track.collect_facts();
         facts.extend(self.model().map(|model| Fact::from_text("device", &model.name)));
+        facts.push(Fact::from_number("model_changes", f64::from(self.model_changes)));
         facts
     }
 
     fn list_problems(&self) -> Vec<SourceProblem> {
-        self.session.as_ref().map_or_else(Vec::new, |session| session.poll.problems().to_vec())
+        let of_model = self.session.as_ref().map_or_else(Vec::new, |session| session.poll.problems().to_vec());
+        of_model.into_iter().chain(self.track.list_problems()).collect()
     }
 
-    fn list_offers(&mut self, _: &dyn Clock) -> Result<Vec<Offer>, SourceError> {
+    fn list_offers(&mut self, clock: &dyn Clock) -> Result<Vec<Offer>, SourceError> {
         let mut session = match self.session.take() {
             Some(session) => session,
-            None => NcLinkSession::open(&self.link, self.layout, &self.own)?,
+            None => NcLinkSession::open(&self.link, self.layout, &self.own, clock.now_ns())?,
         };
         let offers = session.list_offers();
         self.session = offers.is_ok().then_some(session);

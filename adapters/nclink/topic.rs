@@ -5,6 +5,8 @@
 pub enum Subject {
     /// A device makes itself known. Its topic has no serial number.
     Register,
+    /// The device tells the version of its model.
+    Version,
     /// Ask for the model.
     Probe,
     /// The answer to it.
@@ -28,8 +30,9 @@ pub enum Subject {
 }
 
 /// Every subject with the beginning of its topic.
-const TABLE: [(Subject, &str); 11] = [
+const TABLE: [(Subject, &str); 12] = [
     (Subject::Register, "Register/Request"),
+    (Subject::Version, "Probe/Version"),
     (Subject::Probe, "Probe/Query/Request"),
     (Subject::ProbeAnswer, "Probe/Query/Response"),
     (Subject::Query, "Query/Request"),
@@ -66,6 +69,10 @@ impl Subject {
     /// The subject of a topic of this device, and what stands behind the serial number.
     #[must_use]
     pub fn from_topic<'a>(topic: &'a str, serial: &str) -> Option<(Self, &'a str)> {
+        // Of which device it is stands in the message.
+        if topic.strip_prefix("Register/Request").is_some_and(|rest| rest.is_empty() || rest.starts_with('/')) {
+            return Some((Self::Register, ""));
+        }
         let matching = TABLE.iter().filter_map(|(subject, beginning)| {
             let rest = topic.strip_prefix(beginning)?.strip_prefix('/')?.strip_prefix(serial)?;
             if rest.is_empty() { Some((*subject, "")) } else { Some((*subject, rest.strip_prefix('/')?)) }
@@ -87,6 +94,7 @@ mod tests {
             assert_eq!(Subject::from_topic(&format!("{topic}7"), "SN/1"), None, "another device");
         }
         assert_eq!(Subject::Sample.build_filter("A1"), "Sample/A1/#");
-        assert_eq!(Subject::from_topic("Register/Request", "A1"), None);
+        assert_eq!(Subject::from_topic("Register/Request", "A1"), Some((Subject::Register, "")));
+        assert_eq!(Subject::from_topic("Register/Requests", "A1"), None);
     }
 }

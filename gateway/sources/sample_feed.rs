@@ -144,7 +144,7 @@ fn of_worker(name: &str, stats: &WorkerStats, counts: MergeCounts) -> SourceStat
         state: stats.state.as_word(),
         error: stats.last_error.as_ref().filter(|_| failing).map(ToString::to_string),
         period_s: stats.period.as_secs_f64(),
-        period_kept_s: known.then_some(stats.period_kept.p50.as_secs_f64()),
+        period_kept_s: known.then_some(stats.pace.as_secs_f64()),
         jitter_p50_ms: known.then(|| to_milliseconds(stats.lateness.p50)),
         jitter_p99_ms: known.then(|| to_milliseconds(stats.lateness.p99)),
         round_trip_p50_ms: known.then(|| to_milliseconds(stats.round_trip.p50)),

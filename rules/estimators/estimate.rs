@@ -80,11 +80,16 @@ pub enum NoEstimate {
     NothingToChange,
     /// No power was measured.
     PowerUnknown,
+    /// The control does not answer, and the meter shows more than the machine takes at rest: it may be doing anything but being off.
+    ControlSilent {
+        /// What the machine takes, W.
+        power_w: f64,
+    },
 }
 
 impl NoEstimate {
     /// Every word of [`NoEstimate::as_word`].
-    pub const WORDS: [&'static str; 24] = [
+    pub const WORDS: [&'static str; 25] = [
         "not_yet",
         "input_missing",
         "machine_off",
@@ -109,6 +114,7 @@ impl NoEstimate {
         "place_not_learned",
         "nothing_to_change",
         "power_unknown",
+        "control_silent",
     ];
 
     /// The word used in `<quantity>_missing` columns, JSON and SQL.
@@ -139,6 +145,7 @@ impl NoEstimate {
             Self::PlaceNotLearned => "place_not_learned",
             Self::NothingToChange => "nothing_to_change",
             Self::PowerUnknown => "power_unknown",
+            Self::ControlSilent { .. } => "control_silent",
         }
     }
 }
@@ -186,6 +193,9 @@ impl fmt::Display for NoEstimate {
             }
             Self::NothingToChange => f.write_str("the programmed feed is right"),
             Self::PowerUnknown => f.write_str("no power was measured"),
+            Self::ControlSilent { power_w } => {
+                write!(f, "the control does not answer, and the machine draws {power_w:.0} W")
+            }
         }
     }
 }

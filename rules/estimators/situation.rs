@@ -14,6 +14,8 @@ pub(super) struct Tick<'a> {
     pub(super) signals: &'a Signals,
     pub(super) settings: &'a Settings,
     pub(super) filtered_w: Option<f64>,
+    /// Power of the whole machine at rest, W, once it was seen.
+    pub(super) standby_w: Option<f64>,
     /// No-load power at this speed, or why there is none.
     pub(super) no_load: Result<NoLoad, NoEstimate>,
 }
@@ -39,7 +41,34 @@ impl Tick<'_> {
     pub(super) fn determine_situation(&self, crossing_zero: bool, powered_before: bool) -> Situation {
         let no_power = self.is_powered() == Some(false);
         let meter_is_on = self.is_powered() == Some(true) && powered_before;
-        match self.inputs.speed {
+        match (self.inputs.speed, self.find_power_above_rest()) {
+            // Neither a refused connection nor silence is off while power flows: that contradicts off and standby.
+            (Err(Absence::MachineOff), Some(power_w)) if self.standby_w.is_some() => {
+                Situation::Missing(NoEstimate::ControlSilent { power_w })
+            }
+            (Err(Absence::Timeout | Absence::Disconnected | Absence::Stale), Some(power_w)) => {
+                Situation::Missing(NoEstimate::ControlSilent { power_w })
+            }
+            (speed, _) => self.judge_speed(speed, crossing_zero, no_power, meter_is_on),
+        }
+    }
+
+    /// Power of the whole machine, W, where it is visibly more than at rest. Before the machine was seen at rest that is whatever is
+    /// not off.
+    fn find_power_above_rest(&self) -> Option<f64> {
+        let rest_w = ABOVE_REST * self.standby_w.unwrap_or(0.0);
+        let least_w = rest_w.max(self.settings.off_power_w);
+        self.inputs.total.ok().map(f64::abs).filter(|total_w| *total_w > least_w)
+    }
+
+    fn judge_speed(
+        &self,
+        speed: Result<f64, Absence>,
+        crossing_zero: bool,
+        no_power: bool,
+        meter_is_on: bool,
+    ) -> Situation {
+        match speed {
             Err(Absence::MachineOff) if meter_is_on => Situation::Rest,
             Err(Absence::MachineOff) => Situation::Off,
             Err(_) if no_power => Situation::Off,
@@ -80,6 +109,10 @@ pub(super) fn visible_excess_w(no_load: NoLoad, signals: &Signals, settings: &Se
     let relative = settings.c2_on.max(signals.noise.sd()).max(3.0 * signals.noise.level_sd());
     (relative * no_load.power_w).max(no_load.sd_w).max(VISIBLE_STEPS * signals.noise.resolution_w())
 }
+
+/// Power at rest times this is more than rest: lamps, fans and a pump that starts are below it. Too low and a pump counts as a
+/// machine at work that does not answer; too high and a spindle that idles slowly is not noticed.
+const ABOVE_REST: f64 = 1.2;
 
 /// No-load value and load are both rounded to whole steps, each by half a step at most: what is less than this many steps apart
 /// may be the same.

@@ -10,7 +10,7 @@ use adapter_core::words::of_channel;
 use adapter_core::{ChannelId, Sample};
 use estimators::loads::Figure;
 use estimators::wear::tool_of;
-use estimators::{Estimated, Estimates, NoLoadOrigin, SETTINGS, State, Visibility};
+use estimators::{Estimated, Estimates, NoEstimate, NoLoadOrigin, SETTINGS, State, Visibility};
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
@@ -143,7 +143,7 @@ const fn define_word(
 const TOOL: &str = "tool";
 
 /// Words that are neither channels nor quantities.
-const OWN: [Word; 8] = [
+const OWN: [Word; 9] = [
     define_word(
         "state",
         "",
@@ -157,6 +157,13 @@ const OWN: [Word; 8] = [
         WordKind::Number,
         ("How long the machine has been in this state", "当前状态持续时间"),
         WordSource::Number(|view| since_s(view.sample.at_ns, view.estimates.since_ns)),
+    ),
+    define_word(
+        "unknown_because",
+        "",
+        WordKind::Text,
+        ("Why the state is unknown; empty in every other state", "机床状态未知的原因"),
+        WordSource::Text(|it| it.unknown_because.map_or("", NoEstimate::as_word)),
     ),
     define_word(
         "visibility",

@@ -67,6 +67,8 @@ const fn define_unit(dimension: Dimension, factor: f64) -> Unit {
 const INCH_MM: f64 = 25.4;
 /// 0.45359237 kg * 9.80665 m/s2.
 const POUND_N: f64 = 4.448_221_615_260_5;
+/// Standard acceleration of gravity, m/s2 (SI brochure, 3rd General Conference 1901): newtons of a kilogram-force.
+const KILOGRAM_N: f64 = 9.806_65;
 const RAD_RPM: f64 = 60.0 / std::f64::consts::TAU;
 
 use Dimension::{
@@ -159,12 +161,16 @@ const SPELLINGS: &[(&[&str], Unit)] = &[
     (&["kv"], define_unit(Voltage, 1e3)),
     (&["n", "newton", "牛"], define_unit(Force, 1.0)),
     (&["kn", "千牛"], define_unit(Force, 1e3)),
+    (&["kgf", "kp", "公斤力", "千克力"], define_unit(Force, KILOGRAM_N)),
+    (&["gf"], define_unit(Force, KILOGRAM_N / 1e3)),
     (&["dan"], define_unit(Force, 10.0)),
     (&["lbf"], define_unit(Force, POUND_N)),
     (&["nm", "n·m", "n*m", "n.m", "n-m", "牛米"], define_unit(Torque, 1.0)),
     (&["ncm"], define_unit(Torque, 1e-2)),
     (&["nmm", "n·mm"], define_unit(Torque, 1e-3)),
     (&["knm"], define_unit(Torque, 1e3)),
+    (&["kgf.m", "kgf·m", "kgf*m", "kgf-m", "kgfm", "kpm"], define_unit(Torque, KILOGRAM_N)),
+    (&["kgf.cm", "kgf·cm", "kgf*cm", "kgf-cm", "kgfcm", "kpcm"], define_unit(Torque, KILOGRAM_N / 100.0)),
     (&["ft-lb", "ftlb", "lbft", "lbf·ft"], define_unit(Torque, POUND_N * 0.3048)),
     (&["°c", "degc", "c", "celsius", "grad", "℃", "摄氏度"], define_unit(Temperature, 1.0)),
     (&["kelvin"], Unit { dimension: Temperature, factor: 1.0, offset: -273.15 }),
@@ -177,6 +183,7 @@ const SPELLINGS: &[(&[&str], Unit)] = &[
     (&["mbar"], define_unit(Pressure, 1e-3)),
     (&["kpa"], define_unit(Pressure, 0.01)),
     (&["mpa", "兆帕"], define_unit(Pressure, 10.0)),
+    (&["kgf/cm2", "kgf/cm^2", "kgf/cm²", "at"], define_unit(Pressure, KILOGRAM_N / 10.0)),
     (&["psi"], define_unit(Pressure, 0.068_947_572_931_68)),
     (&["pa"], define_unit(Pressure, 1e-5)),
     (&["wh"], define_unit(Energy, 1.0)),
@@ -212,6 +219,11 @@ impl Unit {
     }
 }
 
+/// Every spelling of every unit.
+pub fn list_symbols() -> impl Iterator<Item = &'static str> {
+    EXACT.iter().chain(SPELLINGS).flat_map(|(spellings, _)| spellings.iter().copied())
+}
+
 /// Every unit of a dimension with its symbol, the base first.
 pub fn units_of(dimension: Dimension) -> impl Iterator<Item = (&'static str, Unit)> {
     let of = move |(_, unit): &&(&[&str], Unit)| unit.dimension == dimension;
@@ -237,6 +249,9 @@ mod tests {
             (1.0, "in", "mm", 25.4),
             (0.0, "°C", "K", 273.15),
             (212.0, "°F", "°C", 100.0),
+            (2.0, "kgf", "N", 19.6133),
+            (10.0, "kgf.cm", "N m", 0.980_665),
+            (1.0, "kgf/cm2", "bar", 0.980_665),
             (3000.0, "1/min", "rad/s", 314.159_265_358_979_3),
             (50.0, "1/s", "rpm", 3000.0),
             (1.5, "kW", "W", 1500.0),

@@ -2,14 +2,14 @@
 
 use super::decode::{self, ChannelWord};
 use super::lenient_json::parse_integer;
-use super::message::{NcLinkAnswer, RequestedItem, first_number};
+use super::measured::ItemConversion;
+use super::message::{NcLinkAnswer, RequestedItem};
 use super::model::{Model, ModelItem};
 use super::own_path::OwnPath;
 use adapter_core::channel::ChannelId;
-use adapter_core::conversion::{self, Conversion};
 use adapter_core::driver::SourceProblem;
 use adapter_core::own::Own;
-use adapter_core::reading::{Absence, Reading, Stamp, Value as Held};
+use adapter_core::reading::{Absence, Reading, Stamp};
 use serde_json::Value;
 use std::sync::Arc;
 
@@ -65,11 +65,20 @@ const SPINDLE: [(&str, &str, &str); 3] = [
 ];
 
 fn format_line(value: &Value) -> Option<String> {
-    parse_integer(value).map(|line| format!("N{line}"))
+    parse_numbered(value, 'N').map(|line| format!("N{line}"))
 }
 
 fn format_tool(value: &Value) -> Option<String> {
-    parse_integer(value).map(|tool| format!("T{tool}"))
+    parse_numbered(value, 'T').map(|tool| format!("T{tool}"))
+}
+
+/// `7`, `"07"` or, as the program writes it, `"T07"`.
+fn parse_numbered(value: &Value, letter: char) -> Option<i64> {
+    let word = |text: &str| {
+        let digits = text.trim().strip_prefix([letter, letter.to_ascii_lowercase()])?;
+        digits.bytes().all(|byte| byte.is_ascii_digit()).then(|| digits.parse().ok())?
+    };
+    parse_integer(value).or_else(|| value.as_str().and_then(word))
 }
 
 fn format_alarm(value: &Value) -> Option<String> {
@@ -98,8 +107,8 @@ pub(super) fn list_channels(own: &[Own<OwnPath>]) -> Vec<ChannelId> {
 struct PolledItem {
     channel: ChannelId,
     how: How,
-    /// From the unit of the device to that of the channel; `None` where that is not known.
-    conversion: Option<Conversion>,
+    /// From the unit of the device to that of the channel.
+    conversion: ItemConversion<'static>,
     /// The user's own channel, whose way of reading goes before `how`.
     own: Option<Own<OwnPath>>,
 }
@@ -155,8 +164,7 @@ impl NcLinkPoll {
             return;
         };
         let Some(item) = model.find_item(path).or_else(|| self.find_elsewhere(model, path, channel)) else { return };
-        let conversion =
-            if matches!(how, How::Number) { self.find_conversion(item, channel) } else { Some(Conversion::NONE) };
+        let conversion = self.find_conversion(item, channel, matches!(how, How::Number));
         self.requested_items.push(RequestedItem::with_elements(name_item(item, by_path).as_str(), indexes));
         self.items.push(PolledItem { channel, how, conversion, own: None });
     }
@@ -168,8 +176,7 @@ impl NcLinkPoll {
                 next: "Write the path as doctor --all lists it".to_owned(),
             });
         };
-        let is_text = own.channel.new.unit.is_empty();
-        let conversion = if is_text { Some(Conversion::NONE) } else { self.find_conversion(item, own.id) };
+        let conversion = self.find_conversion(item, own.id, !own.channel.new.unit.is_empty());
         let indexes: Vec<u32> = own.item.index.into_iter().collect();
         self.requested_items.push(RequestedItem::with_elements(name_item(item, by_path).as_str(), &indexes));
         self.items.push(PolledItem { channel: own.id, how: How::Number, conversion, own: Some(own.clone()) });
@@ -197,17 +204,11 @@ impl NcLinkPoll {
         None
     }
 
-    /// From the unit that the model tells to that of the channel. A model without units means those of the channels.
-    fn find_conversion(&mut self, item: &ModelItem, channel: ChannelId) -> Option<Conversion> {
-        let Some(unit) = &item.unit else { return Some(Conversion::NONE) };
-        let wanted = channel.channel().unit;
-        let found = conversion::find_conversion(unit, wanted);
-        if found.is_none() {
-            let why = if conversion::is_known(unit) {
-                "which measures something else"
-            } else {
-                "which is no unit that is known"
-            };
+    /// From the unit that the model tells to that of the channel, where the item gives numbers.
+    fn find_conversion(&mut self, item: &ModelItem, channel: ChannelId, of_numbers: bool) -> ItemConversion<'static> {
+        let (unit, wanted) = (item.unit.as_deref().filter(|_| of_numbers), channel.channel().unit);
+        let conversion = ItemConversion::new(unit, wanted);
+        if let (Some(unit), Some(why)) = (unit, conversion.problem()) {
             self.problems.push(SourceProblem {
                 what: format!(
                     "{channel} has no value: the device gives {} in {unit:?}, {why}; {wanted} is wanted",
@@ -217,7 +218,7 @@ impl NcLinkPoll {
                     .to_owned(),
             });
         }
-        found
+        conversion
     }
 
     /// What of the model cannot be used as it is.
@@ -292,24 +293,11 @@ impl PolledItem {
     }
 
     fn build_number_reading(&self, answer: &Option<NcLinkAnswer>, stamp: Stamp) -> Reading {
-        let Some(conversion) = self.conversion else {
-            return Reading::from_absence(self.channel, stamp, Absence::UnknownUnit);
-        };
         if let Some(own) = &self.own {
-            return own.to_reading(
-                stamp,
-                own.item.extract_value(&own.channel, answer.as_ref()).map(|value| convert_value(value, conversion)),
-            );
+            return own.to_reading(stamp, own.item.extract_value(&own.channel, answer.as_ref(), &self.conversion));
         }
-        let found = self.find_value(answer).and_then(|value| {
-            if value.is_null() {
-                Err(Absence::NotYetRead)
-            } else {
-                first_number(std::slice::from_ref(value)).ok_or(Absence::OutOfRange)
-            }
-        });
-        match found {
-            Ok(number) => Reading::from_number(self.channel, stamp, conversion.convert_number(number)),
+        match self.find_value(answer).and_then(|value| self.conversion.convert_value(value)) {
+            Ok(number) => Reading::from_number(self.channel, stamp, number),
             Err(reason) => Reading::from_absence(self.channel, stamp, reason),
         }
     }
@@ -330,13 +318,6 @@ impl PolledItem {
             Ok(text) => Reading::from_text(self.channel, stamp, Arc::from(text)),
             Err(reason) => Reading::from_absence(self.channel, stamp, reason),
         }
-    }
-}
-
-fn convert_value(value: Held, conversion: Conversion) -> Held {
-    match value {
-        Held::Number(number) => Held::Number(conversion.convert_number(number)),
-        text @ Held::Text(_) => text,
     }
 }
 

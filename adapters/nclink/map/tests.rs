@@ -1,3 +1,4 @@
+use super::super::sample::SampleBlock;
 use super::*;
 use adapter_core::reading::Value as Held;
 use serde_json::json;
@@ -106,4 +107,81 @@ fn another_spindle_can_be_named() {
     let plan = NcLinkPoll::from_model(&model(), NcLinkLayout { spindle_axis: Some(0), ..LAYOUT }, &[], false);
     let readings = answered(&plan, &[("c0", json!(3.5)), ("c5", json!(9.0))]);
     assert_eq!(of(&readings, "spindle_current_a"), Ok(Held::Number(3.5)));
+}
+
+/// A model of one item, and the sample channel that holds it.
+fn model_of(path: &str, unit: &str) -> Model {
+    let parts: Vec<&str> = path.split('/').collect();
+    let numbered = |part: &str| match part.split_once('@') {
+        Some((kind, number)) => json!({"type": kind, "number": number}),
+        None => json!({"type": part}),
+    };
+    let (last, above) = parts.split_last().expect("a path");
+    let mut item = numbered(last);
+    (item["id"], item["units"]) = (json!("it"), json!(unit));
+    let mut node = json!({"dataItems": [item]});
+    for part in above.iter().rev() {
+        let mut outer = numbered(part);
+        outer.as_object_mut().expect("an object").extend(node.as_object().expect("an object").clone());
+        node = json!({"components": [outer]});
+    }
+    node["type"] = json!("MACHINE");
+    node["configs"] = json!([{"id": "s1", "type": "SAMPLE_CHANNEL", "sampleInterval": 1, "ids": [{"id": "it"}]}]);
+    Model::parse(&json!({"devices": [node]})).expect("a model")
+}
+
+fn list_paths(rows: [(&'static str, &'static str, &'static str); 3], number: u32) -> impl Iterator<Item = String> {
+    rows.into_iter().flat_map(move |(item, other, _)| [item, other].map(|item| format!("AXIS@{number}/{item}")))
+}
+
+/// What is sampled says the same as what is asked for: for every channel that has a number, in every unit of the table.
+#[test]
+fn polled_and_sampled_numbers_are_right_or_absent_in_every_unit() {
+    let fixed = FIXED.iter().filter(|(.., how)| matches!(how, How::Number)).map(|(path, ..)| (*path).to_owned());
+    let paths: Vec<String> = fixed.chain(list_paths(LINEAR, 0)).chain(list_paths(SPINDLE, 5)).collect();
+    let (mut right, mut absent) = (0, 0);
+    for path in &paths {
+        for unit in adapter_core::channel::unit::list_symbols().chain(["furlong"]) {
+            let model = model_of(path, unit);
+            let plan = NcLinkPoll::from_model(&model, LAYOUT, &[], false);
+            let channel = plan.items.first().unwrap_or_else(|| panic!("{path} feeds a channel")).channel;
+            let wanted = channel.channel().unit;
+            let truth = adapter_core::conversion::find_conversion(unit, wanted).map(|to| to.convert_number(3.0));
+            let polled = of(&answered(&plan, &[("it", json!(3))]), channel.name());
+            let message = json!({"beginTime": 5, "data": [{"data": [3, "3", [3]]}]});
+            let block = SampleBlock::parse(&message, "s1", &model).expect("sense");
+            let sampled = block.columns[0].convert_values(wanted);
+            match truth {
+                Some(truth) => {
+                    let believed = Reading::from_number(channel, Stamp::from_exact_time(0), truth).value;
+                    assert_eq!(polled, believed, "{path} in {unit}");
+                    assert_eq!(sampled, Ok(vec![Some(truth); 3]), "{path} in {unit}");
+                    right += 1;
+                }
+                None => {
+                    assert_eq!(polled, Err(Absence::UnknownUnit), "{path} in {unit}");
+                    assert!(sampled.is_err() && plan.problems().len() == 1, "{path} in {unit}");
+                    absent += 1;
+                }
+            }
+        }
+    }
+    assert!(right >= 150 && absent >= 2500, "{right} right, {absent} absent");
+}
+
+#[test]
+fn texts_with_their_unit_and_tools_with_their_letter_are_read() {
+    let model = model_of("FEED_OVERRIDE", "%");
+    let plan = NcLinkPoll::from_model(&model, LAYOUT, &[], false);
+    assert_eq!(of(&answered(&plan, &[("it", json!("85%"))]), "feed_override_pct"), Ok(Held::Number(85.0)));
+    for (said, tool) in
+        [(json!("T07"), Some("T7")), (json!("t7"), Some("T7")), (json!("07"), Some("T7")), (json!("TX"), None)]
+    {
+        assert_eq!(format_tool(&said).as_deref(), tool, "{said}");
+    }
+    assert_eq!(format_line(&json!("N0120")).as_deref(), Some("N120"));
+    let current = model_of("AXIS@5/MOTOR/CURRENT", "mA");
+    let message = json!({"beginTime": 5, "data": [{"data": ["200 mA", "0.3 A", 400]}]});
+    let block = SampleBlock::parse(&message, "s1", &current).expect("sense");
+    assert_eq!(block.columns[0].convert_values("A"), Ok(vec![Some(0.2), Some(0.3), Some(0.4)]));
 }

@@ -103,8 +103,14 @@ impl Inference {
         self.take_to_reference_voltage(&mut inputs);
         let filtered_w = inputs.power.ok().and_then(|power| self.state.signals.push_power(power, &self.settings));
         let mut no_load = self.select_no_load_reference(&inputs);
-        let tick =
-            Tick { inputs: &inputs, signals: &self.state.signals, settings: &self.settings, filtered_w, no_load };
+        let tick = Tick {
+            inputs: &inputs,
+            signals: &self.state.signals,
+            settings: &self.settings,
+            filtered_w,
+            standby_w: self.state.standby_w,
+            no_load,
+        };
         let feed = self.state.signals.classify_feed(&inputs, &self.settings);
         let verdict = self.state.detector.update_state(&tick);
         if let Some(power_w) = verdict.settled_at_w {
@@ -172,7 +178,8 @@ impl Inference {
         verdict: &Detected,
     ) {
         let memory = &mut self.state;
-        if let (State::Standby, Ok(total)) = (verdict.state, inputs.total) {
+        // Of a control that says nothing it is not known whether its machine is at rest.
+        if let (State::Standby, Ok(total), Ok(_)) = (verdict.state, inputs.total, inputs.speed) {
             let standby = memory.standby_w.get_or_insert(total);
             *standby += STANDBY_WEIGHT * (total - *standby);
         }
