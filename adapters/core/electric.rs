@@ -3,11 +3,13 @@
 //! A meter that is read with the map of another one answers promptly and nothing fails: 0 W, 4e-35 V. Its voltage gives it away,
 //! because a meter that measures anything hangs on a supply. So a voltage that no supply has costs everything in the same answer its
 //! value, and so does an answer that is all zero for one poll. What is missing on one phase only, and powers that contradict each
-//! other, cost themselves. Nothing is corrected.
+//! other, cost themselves. No phase carries more active power than its voltage times its current, so that these three together are
+//! a witness that a wrong map hardly passes. Nothing is corrected.
 //!
 //! Limits: low-voltage supplies of the world are 100 to 400 V against neutral (IEC 60038), with 20 % on either side; 45 to
 //! 65 Hz holds 50 and 60 Hz with 10 %. Powers of phases and their sum are refreshed one after the other by some meters; only what stays
-//! apart for `LASTS` answers counts.
+//! apart for `LASTS` answers counts, once they have agreed: before that a contradiction counts at once, because it is the profile that
+//! is not proven yet.
 
 use crate::driver::SourceProblem;
 
@@ -19,6 +21,8 @@ const LINE_V: (f64, f64) = (138.0, 831.0);
 const SUPPLY_HZ: (f64, f64) = (45.0, 65.0);
 /// Powers of the phases and their sum may be apart by this share, and by so many watts.
 const APART: (f64, f64) = (0.1, 20.0);
+/// Apparent power below this share of voltage times current is that of a part of the phases.
+const PART: f64 = 0.5;
 /// So many answers in a row.
 const LASTS: u32 = 2;
 
@@ -65,6 +69,10 @@ pub struct SupplyCheck {
     sum_apart: u32,
     /// Answers in a row with less apparent than active power.
     less_apparent: u32,
+    /// Answers in a row with more active power than voltage times current.
+    above_product: u32,
+    /// Have the powers of an answer agreed with each other and with voltage and current?
+    has_agreed: bool,
 }
 
 const WRONG_MAP: &str = "Compare with the meter's own display: is this the profile of this very model, with its word order? doctor --all tries \
@@ -79,10 +87,17 @@ impl SupplyCheck {
     pub fn judge_values(&mut self, values: &SupplyValues) -> Doubts {
         let mut doubts = Doubts::default();
         judge_voltages(values, &mut doubts);
-        self.judge_powers(values, &mut doubts);
+        // Without a supply there is nothing that powers could contradict.
+        if !doubts.everything {
+            self.judge_powers(values, &mut doubts);
+        }
         if let Some(hz) = values.frequency.filter(|hz| !is_within_range(*hz, SUPPLY_HZ)) {
-            let what = format!("the meter says {hz:.4e} Hz, which is no frequency of a supply");
-            doubts.add(what, WRONG_MAP, |doubts| doubts.frequency = true);
+            let what = format!("wrong profile? The meter says {hz:.4e} Hz, which is no frequency of a supply");
+            // With voltages of a supply beside it, it is this register alone.
+            let alone = values.voltage.iter().any(Option::is_some) || values.line_voltage.is_some();
+            doubts.add(what, WRONG_MAP, |doubts| {
+                (doubts.frequency, doubts.everything) = (true, doubts.everything || !alone)
+            });
         }
         judge_zeros(values, &mut doubts);
         doubts
@@ -97,17 +112,44 @@ impl SupplyCheck {
         };
         let is_apart = values.power.is_some_and(|total| phases.len() == 3 && apart(total));
         self.sum_apart = if is_apart { self.sum_apart + 1 } else { 0 };
+        let product = sum_voltage_times_current(values);
+        let above = |(product, power): (f64, f64)| power.abs() > product * (1.0 + APART.0) + APART.1;
+        let most = values.power.map(f64::abs).into_iter().chain([phases.iter().map(|power| power.abs()).sum()]);
+        let is_above = product.zip(most.reduce(f64::max)).is_some_and(above);
+        self.above_product = if is_above { self.above_product + 1 } else { 0 };
+        // A third of it is one phase; vector and arithmetic sums of a real load differ by much less than half.
+        let part = |(apparent, product): (f64, f64)| apparent < PART * product - 2.0 * APART.1;
+        let is_part = values.apparent_power.zip(product).is_some_and(part);
         let less = |(apparent, power): (f64, f64)| apparent < power.abs() * (1.0 - APART.0) - APART.1;
         let is_less = values.apparent_power.zip(values.power).is_some_and(less);
         self.less_apparent = if is_less { self.less_apparent + 1 } else { 0 };
-        if self.sum_apart >= LASTS {
+        if is_part && !self.has_agreed {
             let what = format!(
-                "the powers of the phases make {sum:.0} W, and the meter says {:.0} W",
+                "wrong profile? The meter says {:.0} VA, and voltage times current of the phases make {:.0} VA",
+                values.apparent_power.unwrap_or(0.0),
+                product.unwrap_or(0.0)
+            );
+            doubts.add(what, WRONG_MAP, |doubts| doubts.power = true);
+        }
+        self.has_agreed |=
+            !is_apart && !is_less && !is_above && !is_part && values.power.is_some_and(|power| power.abs() > APART.1);
+        let lasts = if self.has_agreed { LASTS } else { 1 };
+        if self.above_product >= lasts {
+            let what = format!(
+                "wrong profile? Voltage times current of the phases make {:.0} VA, and the meter says {:.0} W, which cannot be more",
+                product.unwrap_or(0.0),
+                values.power.unwrap_or(sum)
+            );
+            doubts.add(what, WRONG_MAP, |doubts| doubts.power = true);
+        }
+        if self.sum_apart >= lasts {
+            let what = format!(
+                "wrong profile? The powers of the phases make {sum:.0} W, and the meter says {:.0} W",
                 values.power.unwrap_or(0.0)
             );
             doubts.add(what, WRONG_MAP, |doubts| doubts.power = true);
         }
-        if self.less_apparent >= LASTS {
+        if self.less_apparent >= lasts {
             let (apparent, power) = (values.apparent_power.unwrap_or(0.0), values.power.unwrap_or(0.0));
             let what = format!(
                 "the meter says {apparent:.0} VA of apparent power and {power:.0} W of active power, which cannot be more"
@@ -119,6 +161,16 @@ impl SupplyCheck {
             doubts.add(what, WRONG_MAP, |doubts| doubts.power = true);
         }
     }
+}
+
+/// Apparent power of the phases that voltage and current tell, VA; `None` unless every phase with a current has a voltage too.
+fn sum_voltage_times_current(values: &SupplyValues) -> Option<f64> {
+    // Between phases stands for each of them against neutral.
+    let of_line = values.line_voltage.map(|volts| volts / 3.0_f64.sqrt());
+    let known =
+        values.current.iter().zip(values.voltage).filter_map(|(amps, volts)| Some(((*amps)?, volts.or(of_line))));
+    let products: Option<Vec<f64>> = known.map(|(amps, volts)| Some((amps * volts?).abs())).collect();
+    products.filter(|products| !products.is_empty()).map(|products| products.iter().sum())
 }
 
 fn judge_voltages(values: &SupplyValues, doubts: &mut Doubts) {
@@ -186,6 +238,7 @@ mod tests {
         let mut check = SupplyCheck::default();
         for values in [
             well(),
+            SupplyValues { current: [Some(0.0); 3], power: Some(0.0), phase_power: [Some(0.0); 3], ..well() },
             SupplyValues { power: Some(-3000.0), phase_power: [Some(-1000.0); 3], power_factor: Some(-0.9), ..well() },
             SupplyValues { power: Some(4000.0), ..SupplyValues::default() },
             SupplyValues { voltage: [Some(120.0); 3], ..well() },
@@ -210,6 +263,8 @@ mod tests {
     fn powers_that_contradict_each_other_are_not_believed_when_they_stay_apart() {
         let wrong = SupplyValues { power: Some(9000.0), ..well() };
         let mut check = SupplyCheck::default();
+        assert!(check.judge_values(&wrong).power, "before the profile has proven itself, at once");
+        assert!(!check.judge_values(&well()).power);
         assert!(!check.judge_values(&wrong).power, "a meter may refresh them one after the other");
         assert!(check.judge_values(&wrong).power);
         assert!(!check.judge_values(&well()).power);
@@ -218,6 +273,26 @@ mod tests {
         assert!(check.judge_values(&apparent).power);
         assert!(check.judge_values(&SupplyValues { power_factor: Some(90.0), ..well() }).power);
         assert!(check.judge_values(&SupplyValues { frequency: Some(0.05), ..well() }).frequency);
+    }
+
+    #[test]
+    fn no_more_power_is_believed_than_voltage_and_current_make() {
+        // A map in which the third phase is the total: 2500 W, and U times I of the three makes 1525 VA.
+        let total_as_phase = SupplyValues {
+            phase_power: [Some(500.0), Some(500.0), Some(1500.0)],
+            current: [Some(2.2); 3],
+            voltage: [Some(230.0), Some(231.0), Some(232.0)],
+            ..SupplyValues::default()
+        };
+        let doubts = SupplyCheck::default().judge_values(&total_as_phase);
+        assert!(doubts.power && doubts.problems[0].what.contains("1525 VA"), "{doubts:?}");
+        let ten_times =
+            SupplyValues { power: Some(15_000.0), phase_power: [None; 3], current: [Some(2.2); 3], ..well() };
+        assert!(SupplyCheck::default().judge_values(&ten_times).power);
+        let between_phases = SupplyValues { voltage: [None; 3], line_voltage: Some(400.0), ..ten_times };
+        assert!(SupplyCheck::default().judge_values(&between_phases).power);
+        let no_voltage = SupplyValues { power: Some(1500.0), frequency: Some(3.0), ..SupplyValues::default() };
+        assert!(SupplyCheck::default().judge_values(&no_voltage).everything);
     }
 
     #[test]

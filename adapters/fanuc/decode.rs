@@ -250,3 +250,37 @@ fn read_parameter(
     }
     Ok(FocasAnswer::Data { kind, values })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::item::BlockWord;
+    use super::*;
+
+    /// Controls send more behind these values than is known; the beginning is their meaning. One byte too few is refused.
+    #[test]
+    fn more_bytes_behind_a_value_change_nothing() {
+        let number = [0, 0, 4, 0xB0, 0, 10, 0, 0];
+        for item in [
+            FocasItem::Feed,
+            FocasItem::SpindleSpeed,
+            FocasItem::Sequence,
+            FocasItem::Program,
+            FocasItem::ModalWord(BlockWord::F),
+        ] {
+            let whole = if item == FocasItem::Sequence { &number[..4] } else { &number[..] };
+            let generation = Generation::from_version(4);
+            let plain = read_answer(item, generation, whole).expect("whole");
+            for more in 1..=24 {
+                let longer = [whole, &vec![0xAA; more]].concat();
+                assert_eq!(read_answer(item, generation, &longer), Ok(plain.clone()), "{item:?} with {more} more");
+            }
+            for fewer in 0..whole.len() {
+                assert!(read_answer(item, generation, &whole[..fewer]).is_err(), "{item:?} with {fewer} bytes");
+            }
+        }
+        assert_eq!(
+            read_answer(FocasItem::Feed, Generation::from_version(4), &number),
+            Ok(FocasAnswer::Number(Some(1200.0)))
+        );
+    }
+}

@@ -231,7 +231,7 @@ mod tests {
             let place = if *letter == 'F' { &mut control[*byte] } else { &mut ladder[byte - 6] };
             *place = i32::from(*value);
         }
-        Signals::new(Ok(&control), Ok(&ladder))
+        Signals::new(Ok(&control), Ok(&ladder), Ok(&[0]))
     }
 
     #[test]
@@ -265,7 +265,7 @@ mod tests {
         assert_eq!(signals(&[('G', 12, 0xAF), ('F', 2, 0x08)]).feed_override(false), Ok(100.0), "threading");
         assert_eq!(signals(&[]).spindle_override(), Ok(100.0));
         assert_eq!(
-            Signals::new(Err(Absence::Refused), Err(Absence::Refused)).feed_override(false),
+            Signals::new(Err(Absence::Refused), Err(Absence::Refused), Ok(&[0])).feed_override(false),
             Err(Absence::Refused)
         );
     }

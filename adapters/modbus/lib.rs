@@ -31,6 +31,8 @@
 
 pub mod address;
 mod crc;
+#[cfg(test)]
+mod crossed_tests;
 mod error;
 pub mod line;
 mod meter;

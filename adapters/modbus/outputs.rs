@@ -7,6 +7,7 @@ use super::register::{MeterRegister, RegisterMeaning};
 use crate::address::MeterTarget;
 use adapter_core::address::Circuit;
 use adapter_core::channel::ChannelId;
+use adapter_core::driver::SourceProblem;
 use adapter_core::electric::{Doubts, SupplyValues};
 use adapter_core::integer::count_to_f64;
 use adapter_core::reading::Reading;
@@ -166,6 +167,24 @@ pub(super) fn list_channels(profile: &Profile, circuit: Circuit) -> Result<Vec<M
         seen.push(output.channel);
     }
     if outputs.is_empty() { Err(MeterError::NoChannel { profile: profile.name.clone() }) } else { Ok(outputs) }
+}
+
+/// A map that nobody has confirmed is believed only with all of its witnesses: a meter that refuses one of them may be another one.
+pub(super) fn doubt_missing_witnesses(profile: &Profile, poll: &RegisterPoll, doubts: &mut Doubts) {
+    let is_electric = |meaning| !matches!(meaning, RegisterMeaning::Channel(_) | RegisterMeaning::Energy);
+    let mut electric = profile.registers.iter().filter(|register| is_electric(register.meaning));
+    let Some(missing) = electric.find(|register| !poll.has_register(register)).filter(|_| !profile.confirmed) else {
+        return;
+    };
+    (doubts.power, doubts.voltage) = (true, true);
+    doubts.problems.push(SourceProblem {
+        what: format!(
+            "wrong profile? The map of {} is not confirmed, and this meter does not have its register {}: no power is believed",
+            profile.meter, missing.address
+        ),
+        next: "Compare with the meter's own list of registers, and take the register out of a copy of the profile if the rest fits"
+            .to_owned(),
+    });
 }
 
 /// What the last poll says of the supply.

@@ -2,7 +2,7 @@
 //!
 //! A meter may not give as many registers at once as the protocol allows, or not those that nobody reads. It says so with an
 //! exception (2 or 3), and the block is then read in parts: first without what nobody reads, then in halves, down to single
-//! numbers. What was found out is remembered as long as the source lives.
+//! numbers. What was found out is remembered for a minute; then whole blocks are asked for again.
 
 use super::error::MeterError;
 use super::pdu::{RegisterBlock, RegisterTable};

@@ -5,9 +5,13 @@ use super::pdu::{NoRegisters, RegisterBlock};
 use super::plan::PollBlocks;
 use super::register::MeterRegister;
 use adapter_core::address::SerialTarget;
-use adapter_core::clock::Clock;
+use adapter_core::clock::{Clock, SECOND_NS, TimeNs};
 use adapter_core::reading::{Absence, Stamp};
 use std::time::Duration;
+
+/// What was refused is asked for again after this: a meter that starts refuses for seconds what it has later. What a meter really
+/// does not have costs some requests more a minute.
+const ASK_AGAIN_NS: i64 = 60 * SECOND_NS;
 
 /// What a block gave, and when.
 type BlockAnswer = (Result<Vec<u16>, u8>, Stamp);
@@ -20,13 +24,21 @@ pub(super) struct RegisterPoll {
     /// As the meter gives it.
     blocks: PollBlocks,
     answers: Vec<BlockAnswer>,
+    /// When whole blocks were last asked for.
+    whole_ns: TimeNs,
     /// Stamp of the last poll, for what was not read in it.
     stamp: Stamp,
 }
 
 impl RegisterPoll {
     pub(super) fn new(blocks: PollBlocks) -> Self {
-        Self { initial_blocks: blocks.clone(), blocks, answers: Vec::new(), stamp: Stamp::from_exact_time(0) }
+        Self {
+            initial_blocks: blocks.clone(),
+            blocks,
+            answers: Vec::new(),
+            whole_ns: TimeNs::MIN,
+            stamp: Stamp::from_exact_time(0),
+        }
     }
 
     /// Asks for everything once. A block that is refused is kept as refused while another one is answered.
@@ -40,7 +52,15 @@ impl RegisterPoll {
         unit: u8,
     ) -> Result<(), (ModbusError, String)> {
         self.answers.clear();
-        self.stamp = Stamp::from_exact_time(clock.now_ns());
+        let now_ns = clock.now_ns();
+        self.stamp = Stamp::from_exact_time(now_ns);
+        if !self.is_split() {
+            self.whole_ns = now_ns;
+        } else if !(0..ASK_AGAIN_NS).contains(&now_ns.saturating_sub(self.whole_ns)) {
+            // A clock that was set back asks, too.
+            self.blocks = self.initial_blocks.clone();
+            self.whole_ns = now_ns;
+        }
         let mut refused = None;
         while let Some(block) = self.blocks.blocks.get(self.answers.len()).copied() {
             match ask_block(line, clock, unit, &block) {

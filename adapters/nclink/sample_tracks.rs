@@ -37,7 +37,7 @@ pub struct SampleTracks {
     nonsense: u64,
     why: Option<String>,
     /// Is `why` that of the last message?
-    stands: bool,
+    why_stands: bool,
     /// How the device tells times, where that is not as the standard has it.
     clock: Option<ForeignClock>,
 }
@@ -82,7 +82,7 @@ impl SampleTracks {
 
     /// What is wrong with what the device sends by itself at the moment.
     pub(super) fn list_problems(&self) -> Vec<SourceProblem> {
-        let unusable = self.why.as_ref().filter(|_| self.stands).map(|why| SourceProblem {
+        let unusable = self.why.as_ref().filter(|_| self.why_stands).map(|why| SourceProblem {
             what: format!("what the device sends on its sample channels cannot be used: {why}"),
             next: "Correct the sample channel in the device's model or adapter; what is polled goes on without it"
                 .to_owned(),
@@ -102,7 +102,7 @@ impl SampleTracks {
     pub(super) fn record_nonsense(&mut self, why: String) {
         self.nonsense += 1;
         self.why = Some(why);
-        self.stands = true;
+        self.why_stands = true;
     }
 
     pub(super) fn record_event(&mut self, message: &Value) {
@@ -120,7 +120,7 @@ impl SampleTracks {
         if self.channels.len() >= CHANNELS_MAX && !self.channels.contains_key(&block.channel) {
             return self.record_nonsense(format!("more than {CHANNELS_MAX} sample channels"));
         }
-        (self.stands, self.clock) = (false, block.clock);
+        (self.why_stands, self.clock) = (false, block.clock);
         self.channels.entry(block.channel.clone()).or_default().record_block(block);
     }
 }

@@ -50,7 +50,7 @@ struct NcLinkSession {
     /// It was silent, or registered itself: it may have another model, or be another machine.
     doubtful: bool,
     /// Was its model another one when it was asked for again?
-    changed: bool,
+    has_new_model: bool,
     /// When its model was last asked for.
     probed_ns: TimeNs,
 }
@@ -100,7 +100,7 @@ impl NcLinkSource {
         let mut outcome = Err(self.build_restless_error());
         for _ in 0..REGISTERED_MAX {
             let answers = session.query_values(self.layout, &self.own, clock);
-            self.model_changes += u32::from(std::mem::take(&mut session.changed));
+            self.model_changes += u32::from(std::mem::take(&mut session.has_new_model));
             // What came by itself is taken in any case: a device that does not answer may still send.
             let registered = self.record_unasked(&mut session)?;
             if !registered {
@@ -179,7 +179,7 @@ impl NcLinkSession {
             understood: false,
             turned: false,
             doubtful: false,
-            changed: false,
+            has_new_model: false,
             probed_ns,
         })
     }
@@ -193,7 +193,7 @@ impl NcLinkSession {
         if model != self.model {
             self.model = model;
             self.by_path = self.model.names_by_path();
-            (self.changed, self.understood, self.turned) = (true, false, false);
+            (self.has_new_model, self.understood, self.turned) = (true, false, false);
             self.poll = NcLinkPoll::from_model(&self.model, layout, own, self.by_path);
         }
         Ok(())

@@ -54,6 +54,7 @@ const NO_ESTIMATES: [(&str, &str, &str); 29] = [
     ("output_missing", "the measured value is missing", "缺少测量值"),
     ("too_few_transients", "too few changes of spindle speed without cutting", "未切削时的主轴变速次数不足"),
     ("unexplained", "the speed does not explain this power", "转速无法解释该功率"),
+    ("changed", "the lag has changed and is estimated anew", "滞后已改变，正在重新估计"),
     ("too_slow", "the speed changes too slowly", "主轴变速过慢"),
     ("ambiguous", "two lags explain the power alike", "存在两个同样合理的滞后"),
     ("too_wide", "not known closely enough", "不确定度过大"),

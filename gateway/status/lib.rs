@@ -186,7 +186,7 @@ pub struct SourceStatus {
     pub error: Option<String>,
     /// Pace it promises, s.
     pub period_s: f64,
-    /// Median of the pace it keeps, s, once known.
+    /// Pace it keeps at the moment, s, once known: values older than two of these count as stale.
     pub period_kept_s: Option<f64>,
     /// How late polls begin against their beat, ms, once known: median and 99th percentile.
     pub jitter_p50_ms: Option<f64>,

@@ -89,7 +89,7 @@ pub enum NoEstimate {
 
 impl NoEstimate {
     /// Every word of [`NoEstimate::as_word`].
-    pub const WORDS: [&'static str; 24] = [
+    pub const WORDS: [&'static str; 25] = [
         "not_yet",
         "input_missing",
         "machine_off",

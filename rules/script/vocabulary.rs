@@ -10,7 +10,7 @@ use adapter_core::words::of_channel;
 use adapter_core::{ChannelId, Sample};
 use estimators::loads::Figure;
 use estimators::wear::tool_of;
-use estimators::{Estimated, Estimates, NoLoadOrigin, SETTINGS, State, Visibility};
+use estimators::{Estimated, Estimates, NoEstimate, NoLoadOrigin, SETTINGS, State, Visibility};
 use std::collections::HashMap;
 use std::sync::LazyLock;
 

@@ -14,6 +14,8 @@
 //! hold the last step.
 
 mod answer;
+#[cfg(test)]
+mod model_change_tests;
 mod registers;
 mod sampling;
 mod tree;

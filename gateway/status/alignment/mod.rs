@@ -9,7 +9,8 @@
 //!
 //! What is found is shown with its width, or with the reason why it cannot be known. With `merge` in `[alignment]` the stamps of
 //! the meter's source are shifted by it: only by a lag that is known, slowly, and standing still while the machine cuts;
-//! what is aimed at is told as an event. A lag that can no longer be known changes nothing that is in force.
+//! what is aimed at is told as an event. Every new change of speed is asked whether it still has that lag: two in a row that say
+//! another one make it unknown until it is found anew. A lag that can no longer be known changes nothing that is in force.
 //!
 //! | file | what |
 //! |---|---|
@@ -101,6 +102,8 @@ impl Alignment {
                 let change = pair.accept_estimate(found, now_ns, seconds_since(now_ns, origin_ns));
                 self.notices.extend(change.map(|change| Notice::new(Severity::Info, change.0, change.1)));
             }
+            let change = pair.check_newest_change(now_ns);
+            self.notices.extend(change.map(|change| Notice::new(Severity::Info, change.0, change.1)));
             if pair.is_due(now_ns) && self.background.is_idle() && pair.collector.take_gathered_data().new {
                 self.background.request_estimate(index, pair.collector.transients().to_vec(), now_ns);
             }

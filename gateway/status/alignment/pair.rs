@@ -6,7 +6,7 @@ use adapter_core::clock::{SECOND_NS, TimeNs};
 use adapter_core::merge::SourceId;
 use adapter_core::{ChannelId, Reading};
 use gateway_config::AlignmentUse;
-use rules::estimators::alignment::{Collector, Lag, LagFollower, NotIdentifiable, PowerPoint, SpeedPoint};
+use rules::estimators::alignment::{Collector, Lag, LagFollower, LagWatch, NotIdentifiable, PowerPoint, SpeedPoint};
 
 /// Pause between two estimates: at first, and at most.
 const PAUSE_NS: (i64, i64) = (60 * SECOND_NS, 600 * SECOND_NS);
@@ -20,7 +20,10 @@ pub(super) struct Pair {
     purpose: AlignmentUse,
     pub(super) collector: Collector,
     pub(super) follower: LagFollower,
+    watch: LagWatch,
     found: Option<LagResult>,
+    /// What was measured before this says nothing of the lag now, s.
+    valid_since_s: f64,
     pause_ns: i64,
     due_ns: TimeNs,
 }
@@ -42,7 +45,9 @@ impl Pair {
             purpose,
             collector: Collector::new(),
             follower: LagFollower::default(),
+            watch: LagWatch::default(),
             found: None,
+            valid_since_s: f64::NEG_INFINITY,
             pause_ns: PAUSE_NS.0,
             due_ns: TimeNs::MIN,
         }
@@ -78,6 +83,21 @@ impl Pair {
         now_ns >= self.due_ns
     }
 
+    /// Looks whether the newest change of speed has the lag that is known. When it does not, nothing is known until the next estimate:
+    /// the kind and the text of an event.
+    pub(super) fn check_newest_change(&mut self, now_ns: TimeNs) -> Option<(&'static str, String)> {
+        let transient = self.collector.take_newest_transient()?;
+        let Some(Ok(known)) = &self.found else { return None };
+        let change = self.watch.observe_transient(transient, known)?;
+        self.collector.keep_newest(LagWatch::TRANSIENTS);
+        self.follower.forget_aim();
+        self.valid_since_s = change.since_s;
+        (self.pause_ns, self.due_ns) = (PAUSE_NS.0, now_ns);
+        let reason = NotIdentifiable::Changed { from_s: change.from_s, to_s: change.to_s };
+        self.found = Some(Err(reason));
+        Some(("lag_unknown", format!("{}: {reason}", self.names[1])))
+    }
+
     /// Takes an answer. The kind and the text of an event when there is something to tell.
     pub(super) fn accept_estimate(
         &mut self,
@@ -85,6 +105,10 @@ impl Pair {
         now_ns: TimeNs,
         now_s: f64,
     ) -> Option<(&'static str, String)> {
+        // It was asked for before the lag changed.
+        if found.as_ref().is_ok_and(|lag| lag.at_s < self.valid_since_s) {
+            return None;
+        }
         self.pause_ns = match &found {
             Ok(_) => PAUSE_NS.1,
             // That costs nothing, and the next change of speed may be the one that was missing.
@@ -98,7 +122,14 @@ impl Pair {
             (Some(Ok(_)), Err(reason)) => Some(("lag_unknown", format!("{}: {reason}", self.names[1]))),
             _ => None,
         };
-        self.found = Some(found);
+        // A change that was seen says more than that there are too few transients since then.
+        let keeps = matches!(
+            (&self.found, &found),
+            (Some(Err(NotIdentifiable::Changed { .. })), Err(NotIdentifiable::TooFewTransients { .. }))
+        );
+        if !keeps {
+            self.found = Some(found);
+        }
         event
     }
 

@@ -48,6 +48,8 @@ pub struct Collector {
     cuts: VecDeque<(f64, f64)>,
     transients: VecDeque<Transient>,
     data: AlignmentData,
+    /// Has a transient come in that nobody has looked at?
+    has_unseen: bool,
 }
 
 impl Collector {
@@ -130,6 +132,18 @@ impl Collector {
         }
         self.transients.push_back(Transient { speed, power: free });
         self.data.new = true;
+        self.has_unseen = true;
+    }
+
+    /// The newest transient, once.
+    pub fn take_newest_transient(&mut self) -> Option<&Transient> {
+        std::mem::take(&mut self.has_unseen).then(|| self.transients.back())?
+    }
+
+    /// Only so many of the newest transients are of use: the lag was another one before.
+    pub fn keep_newest(&mut self, count: usize) {
+        let older = self.transients.len().saturating_sub(count);
+        self.transients.drain(..older);
     }
 
     fn is_cut(&self, time_s: f64) -> bool {

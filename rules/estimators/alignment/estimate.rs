@@ -67,6 +67,8 @@ pub struct Lag {
     pub window_s: f64,
     /// What the power is made of.
     pub model: PowerModel,
+    /// Time constant of the excess of a run-up in it, s.
+    pub excess_tau_s: f64,
     /// Residual standard deviation, W.
     pub residual_w: f64,
     /// Share of the power's variance that is explained.
@@ -123,6 +125,13 @@ pub enum NotIdentifiable {
         /// Half the 95 % interval, s.
         uncertainty_s: f64,
     },
+    /// It was known, and the last changes of speed say another one.
+    Changed {
+        /// The lag that was known, s.
+        from_s: f64,
+        /// What the last changes say, s.
+        to_s: f64,
+    },
 }
 
 impl NotIdentifiable {
@@ -136,6 +145,7 @@ impl NotIdentifiable {
             Self::OutOfRange { .. } => "out_of_range",
             Self::Ambiguous { .. } => "ambiguous",
             Self::TooWide { .. } => "too_wide",
+            Self::Changed { .. } => "changed",
         }
     }
 }
@@ -170,6 +180,9 @@ impl fmt::Display for NotIdentifiable {
                     "lags of {lag_s:.2} s and {rival_s:.2} s explain the power alike: vary the speeds and the pauses"
                 )
             }
+            Self::Changed { from_s, to_s } => {
+                write!(f, "it was {from_s:.2} s and is about {to_s:.2} s now; it is estimated anew")
+            }
             Self::TooWide { uncertainty_s } => {
                 write!(
                     f,
@@ -185,6 +198,8 @@ const INERTIA: usize = 4;
 const EXCESS: usize = 6;
 /// Time constants of the excess of a run-up that are tried, s.
 const EXCESS_TAU_S: [f64; 3] = [0.25, 0.6, 1.2];
+/// Where the excess takes no part its time constant does not matter.
+const NO_EXCESS_TAU_S: f64 = 1.0;
 /// An excess must take away this share of the residual to be believed.
 const EXCESS_SHARE: f64 = 0.1;
 /// Transients over less than this tell nothing of a drift, s.
@@ -203,7 +218,7 @@ pub fn estimate_lag(transients: &[Transient], settings: &LagSettings) -> Result<
     if usable.len() < settings.transients_min {
         return Err(NotIdentifiable::TooFewTransients { found: usable.len(), wanted: settings.transients_min });
     }
-    let (ready, best) = fit_jointly(&usable, settings);
+    let Joint { ready, best, excess_tau_s } = fit_jointly(&usable, settings);
     let explained = 1.0 - best.fitted.rss / best.fitted.total.max(f64::MIN_POSITIVE);
     if explained < settings.explained_min || best.fitted.model[INERTIA] <= 0.0 {
         return Err(NotIdentifiable::Unexplained { explained });
@@ -232,6 +247,7 @@ pub fn estimate_lag(transients: &[Transient], settings: &LagSettings) -> Result<
         drift: line.drift,
         window_s: best.window_s,
         model: best.fitted.power_model(),
+        excess_tau_s,
         residual_w: (best.fitted.rss / count_to_f64(best.fitted.rows)).sqrt(),
         explained,
         inertia_share,
@@ -245,8 +261,15 @@ fn is_usable(transient: &Transient, settings: &LagSettings) -> bool {
     quick && greatest - least >= settings.change_min_rpm && transient.power.len() >= 10 && transient.speed.len() >= 10
 }
 
+/// Lag and window that fit all transients best.
+struct Joint {
+    ready: Vec<Ready>,
+    best: Best,
+    excess_tau_s: f64,
+}
+
 /// The best lag and window, with the excess of a run-up where it is really there.
-fn fit_jointly(usable: &[&Transient], settings: &LagSettings) -> (Vec<Ready>, Best) {
+fn fit_jointly(usable: &[&Transient], settings: &LagSettings) -> Joint {
     let top_rpm = usable.iter().map(|transient| transient.range_rpm().1).fold(0.0, f64::max);
     let make = |tau_s: f64| -> Vec<Ready> {
         usable
@@ -254,7 +277,7 @@ fn fit_jointly(usable: &[&Transient], settings: &LagSettings) -> (Vec<Ready>, Be
             .map(|one| Ready::from_transient(one, top_rpm, tau_s, settings.lags_s, settings.window_max_s))
             .collect()
     };
-    let plain = make(1.0);
+    let plain = make(NO_EXCESS_TAU_S);
     let best = search_lags(
         &plain,
         settings.lags_s,
@@ -264,12 +287,12 @@ fn fit_jointly(usable: &[&Transient], settings: &LagSettings) -> (Vec<Ready>, Be
     let with_excess = EXCESS_TAU_S.into_iter().map(|tau_s| {
         let (ready, shape) = (make(tau_s), PredictorSet::WHOLE);
         let best = search_at(&ready, settings.lags_s, &[best.window_s], shape, settings.window_max_s);
-        (ready, best)
+        Joint { ready, best, excess_tau_s: tau_s }
     });
-    let other = with_excess.min_by(|a, b| a.1.fitted.rss.total_cmp(&b.1.fitted.rss));
-    match other.filter(|(_, other)| other.fitted.rss < (1.0 - EXCESS_SHARE) * best.fitted.rss) {
+    let other = with_excess.min_by(|a, b| a.best.fitted.rss.total_cmp(&b.best.fitted.rss));
+    match other.filter(|other| other.best.fitted.rss < (1.0 - EXCESS_SHARE) * best.fitted.rss) {
         Some(found) => found,
-        None => (plain, best),
+        None => Joint { ready: plain, best, excess_tau_s: NO_EXCESS_TAU_S },
     }
 }
 

@@ -29,6 +29,11 @@ impl LagFollower {
         worth.then(|| *self.told_s.insert(aim_s))
     }
 
+    /// The lag has changed: what is in force stays until the next estimate, which is then aimed at as a whole.
+    pub fn forget_aim(&mut self) {
+        (self.aim_s, self.told_s) = (None, None);
+    }
+
     /// `passed_s` later; what is in force now, s. Frozen while it cuts.
     pub fn step_lag(&mut self, passed_s: f64, cutting: bool) -> f64 {
         if let Some(aim_s) = self.aim_s.filter(|_| !cutting) {
@@ -68,6 +73,7 @@ mod tests {
             drift: None,
             window_s: 0.2,
             model,
+            excess_tau_s: 1.0,
             residual_w: 1.0,
             explained: 0.99,
             inertia_share: 0.5,
@@ -92,5 +98,7 @@ mod tests {
         assert_eq!(follower.aim_at_estimate(&lag(0.201), 0.0), None, "not worth a word");
         let told = follower.aim_at_estimate(&lag(0.8), 0.0).expect("a step");
         assert!((told - 0.25).abs() < 0.002, "{told}");
+        follower.forget_aim();
+        assert_eq!(follower.aim_at_estimate(&lag(0.8), 0.0), Some(0.8), "a change that was seen is followed at once");
     }
 }

@@ -20,6 +20,7 @@
 //! | `estimate` | [`estimate_lag`]: lag, width, drift and window over all transients, or why they cannot be known |
 //! | `courses` | a file on a clock that nobody set, laid beside the history by its cuts |
 //! | `collect` | transients out of a running machine, without what was measured while it cut |
+//! | `change` | whether a new change of speed has the lag that is known, or another one |
 //! | `follow` | the lag in force: follows the estimates slowly, stands still while the machine cuts |
 //!
 //! What makes a lag not identifiable is an answer of its own ([`NotIdentifiable`]): no change of speed, changes too slow to
@@ -29,6 +30,7 @@
 //! belongs to the speed stamped `t - lag`. A drift is a change of that lag over time; for polled devices, stamped by one
 //! clock, it is zero within its width, for a device that streams by its own clock it is that clock's error.
 
+mod change;
 mod collect;
 mod courses;
 mod estimate;
@@ -41,6 +43,7 @@ mod steady;
 #[cfg(test)]
 mod tests;
 
+pub use change::{LagChange, LagWatch};
 pub use collect::{AlignmentData, Collector};
 pub use courses::{Matched, match_courses};
 pub use estimate::{Drift, Lag, LagSettings, NotIdentifiable, estimate_lag};

@@ -69,6 +69,10 @@ fn normal(rng: &mut Pcg64Mcg) -> f64 {
 
 /// The transients of a bench as controller (every 100 ms, stamps off by up to 50 ms) and meter (every 100 ms) see them.
 fn transients(seed: u64, bench: Bench) -> Vec<Transient> {
+    transients_with_lag(seed, bench, TRUE_LAG_S)
+}
+
+fn transients_with_lag(seed: u64, bench: Bench, lag_s: f64) -> Vec<Transient> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let course = course(&mut rng, bench);
     let mut energy = vec![0.0];
@@ -84,7 +88,7 @@ fn transients(seed: u64, bench: Bench) -> Vec<Transient> {
     speed.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     let phase_s = rng.random_range(0.0..0.1);
     let power = times(0.5 + phase_s).map(|time_s| {
-        let (from_s, to_s) = (time_s - TRUE_LAG_S - TRUE_WINDOW_S / 2.0, time_s - TRUE_LAG_S + TRUE_WINDOW_S / 2.0);
+        let (from_s, to_s) = (time_s - lag_s - TRUE_WINDOW_S / 2.0, time_s - lag_s + TRUE_WINDOW_S / 2.0);
         let mean_w = (at(&energy, to_s) - at(&energy, from_s)) / TRUE_WINDOW_S;
         PowerPoint { time_s, power_w: mean_w * (1.0 + 0.01 * normal(&mut rng)) + 2.0 * normal(&mut rng) }
     });
@@ -253,4 +257,33 @@ fn a_drift_of_the_meters_clock_is_told_with_its_width() {
     assert!(drift.ppm > drift.uncertainty_ppm, "{drift:?}");
     let middle_s = lag.at_s;
     assert!((lag.predict_lag(middle_s + 100.0) - lag.predict_lag(middle_s) - 1e-4 * drift.ppm).abs() < 1e-9);
+}
+
+/// A meter whose lag steps after twelve changes of speed, and stays then: told within three, and never where nothing changes.
+#[test]
+fn a_lag_that_steps_is_told_and_one_that_stays_is_not() {
+    let (mut told, mut late, mut false_alarms, mut watched) = (0, 0, 0, 0);
+    for seed in 0..3 {
+        let bench = Bench { back: 0.6, slower: 1.0, changes: 24 };
+        let before = transients(seed, bench);
+        let Ok(known) = estimate_lag(&before[..12], &LagSettings::default()) else { continue };
+        let mut watch = LagWatch::default();
+        watched += before.len() - 12;
+        false_alarms += before[12..].iter().filter(|one| watch.observe_transient(one, &known).is_some()).count();
+        for step_s in [-0.3, 0.1, 0.2, 0.3, 0.5] {
+            let after = transients_with_lag(seed, bench, TRUE_LAG_S + step_s);
+            let mut watch = LagWatch::default();
+            let found = after[12..].iter().position(|one| watch.observe_transient(one, &known).is_some());
+            match found {
+                Some(0..3) => told += 1,
+                // One of them was too small to tell.
+                Some(3) => late += 1,
+                found => panic!("seed {seed}, step {step_s} s, width {} s: {found:?}", known.uncertainty_s),
+            }
+        }
+    }
+    eprintln!(
+        "{told} told within three changes, {late} at the fourth; {false_alarms} false alarms in {watched} changes"
+    );
+    assert!(false_alarms == 0 && watched >= 30 && told >= 10, "{told} {late} {false_alarms} {watched}");
 }

@@ -100,6 +100,9 @@ impl TrialContext {
         if name == "state" {
             return self.give_state(value);
         }
+        if name == "unknown_because" {
+            return self.give_unknown_because(value);
+        }
         if let Some(id) = ChannelId::from_name(name) {
             return self.give_channel(id, value);
         }
@@ -154,6 +157,17 @@ impl TrialContext {
             (self.estimates.state, self.estimates.since_ns) = (state, self.now_ns);
         }
         self.estimates.unknown_because = (state == State::Unknown).then_some(NoEstimate::NotYet);
+        Ok(())
+    }
+
+    /// Of the reasons with a number of their own the number is that of the channel; a trial needs none.
+    fn give_unknown_because(&mut self, value: &Dynamic) -> Result<(), String> {
+        let word = value.clone().into_immutable_string().unwrap_or_default();
+        let known = [NoEstimate::NotYet, NoEstimate::Contradiction, NoEstimate::ControlSilent { power_w: 0.0 }];
+        let words = known.map(NoEstimate::as_word);
+        let found = known.into_iter().find(|reason| reason.as_word() == word.as_str());
+        let refused = || format!("unknown_because = \"{word}\": in a trial it is one of {}", words.join(", "));
+        self.estimates.unknown_because = Some(found.ok_or_else(refused)?);
         Ok(())
     }
 

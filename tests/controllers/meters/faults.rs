@@ -1,6 +1,6 @@
 //! A Modbus TCP meter that misbehaves in every way: each has its own error, and none gives a wrong number.
 
-use super::partner::{number, poll, source};
+use super::partner::{PROFILES, number, poll, source};
 use adapters::SourceError;
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -44,7 +44,7 @@ fn meter(behaviour: impl Fn(u32) -> Behaviour + Send + Sync + 'static) -> String
             });
         }
     });
-    format!("modbus-tcp://{at}?profile=adw300&timeout_ms={TIMEOUT_MS}")
+    format!("modbus-tcp://{at}?profile=one_number&profiles={PROFILES}&timeout_ms={TIMEOUT_MS}")
 }
 
 fn answered(stream: &mut std::net::TcpStream, request: &[u8; 12], count: u32, behaviour: Behaviour) -> bool {

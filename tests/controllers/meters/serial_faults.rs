@@ -1,6 +1,6 @@
 //! A meter on a serial line that misbehaves: the line has no transaction numbers, so silence is the only order there is.
 
-use super::partner::{Cable, cable, number, poll, socat_is_there, source};
+use super::partner::{Cable, PROFILES, cable, number, poll, socat_is_there, source};
 use adapters::SourceError;
 use adapters::modbus::{MeterError, ModbusMeter};
 use std::fs::{File, OpenOptions};
@@ -83,7 +83,9 @@ fn no_answer_is_taken_for_that_to_another_request() {
     let cable = cable(directory.path());
     meter(&cable, BEHAVIOURS);
     let line = cable.ours.display();
-    let mut meter = source(&format!("modbus-rtu://{line}?baud=19200&profile=adw300&timeout_ms={TIMEOUT_MS}"));
+    let mut meter = source(&format!(
+        "modbus-rtu://{line}?baud=19200&profile=one_number&profiles={PROFILES}&timeout_ms={TIMEOUT_MS}"
+    ));
     for (index, behaviour) in BEHAVIOURS.iter().enumerate() {
         let polled = poll(meter.as_mut());
         let own = u32::try_from(index + 1).map(f64::from).expect("small");
@@ -110,7 +112,9 @@ fn two_meters_share_one_line() {
     meter(&cable, &[]);
     let line = cable.ours.display();
     let address = |unit: u8, circuit: &str| {
-        format!("modbus-rtu://{line}?baud=19200&profile=adw300&unit={unit}&circuit={circuit}&timeout_ms=3000")
+        format!(
+            "modbus-rtu://{line}?baud=19200&profile=one_number&profiles={PROFILES}&unit={unit}&circuit={circuit}&timeout_ms=3000"
+        )
     };
     let polls = |address: String, channel: &'static str| {
         thread::spawn(move || {

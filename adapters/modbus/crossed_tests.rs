@@ -1,0 +1,163 @@
+//! Every profile on the register map of every other one, and meters that refuse for a while. A power is right or absent.
+
+use super::line::{ModbusError, ModbusLine, ModbusResponse};
+use super::outputs::{self, MeterChannel};
+use super::pdu;
+use super::plan::PollBlocks;
+use super::poll::RegisterPoll;
+use super::profile::{Profile, SHIPPED, find_profile};
+use super::register::{MeterRegister, RegisterMeaning};
+use adapter_core::address::Circuit;
+use adapter_core::clock::{Clock, ManualClock, SECOND_NS};
+use adapter_core::electric::SupplyCheck;
+use adapter_core::reading::{Absence, Stamp};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// A meter whose registers hold what another map says; others are refused, or 0.
+struct Image {
+    registers: BTreeMap<u16, u16>,
+    others_are_zero: bool,
+    refused: Vec<u16>,
+}
+
+const VOLTS: [f64; 3] = [229.0, 230.5, 232.0];
+const AMPS: [f64; 3] = [2.1, 2.4, 2.2];
+const WATTS: [f64; 3] = [430.0, 510.0, 470.0];
+const TOTAL_W: f64 = 1410.0;
+
+fn true_number(meaning: RegisterMeaning) -> f64 {
+    match meaning {
+        RegisterMeaning::Power => TOTAL_W,
+        RegisterMeaning::PhasePower(at) => WATTS[at],
+        RegisterMeaning::Current(at) => AMPS[at],
+        RegisterMeaning::Voltage(at) => VOLTS[at],
+        RegisterMeaning::LineVoltage => 399.0,
+        RegisterMeaning::Energy => 1234.5,
+        RegisterMeaning::PowerFactor => 0.91,
+        RegisterMeaning::ApparentPower => 1550.0,
+        RegisterMeaning::Frequency => 50.0,
+        RegisterMeaning::Channel(_) => 41.5,
+    }
+}
+
+impl Image {
+    fn from_profile(profile: &Profile, others_are_zero: bool) -> Self {
+        let mut registers = BTreeMap::new();
+        for register in &profile.registers {
+            let number = true_number(register.meaning);
+            let raw = (number - register.conversion.offset) / register.conversion.scale;
+            registers.extend((register.address..).zip(register.format.encode(raw, register.order)));
+        }
+        Self { registers, others_are_zero, refused: Vec::new() }
+    }
+}
+
+impl ModbusLine for Image {
+    fn exchange_pdu(
+        &mut self,
+        clock: &dyn Clock,
+        _: u8,
+        request: &[u8],
+        _: usize,
+    ) -> Result<ModbusResponse, ModbusError> {
+        let block = pdu::parse_request(request).map_err(ModbusError::Refused)?;
+        let asked = block.start..block.start.saturating_add(block.count);
+        if self.refused.iter().any(|address| asked.contains(address)) {
+            return Err(ModbusError::Refused(2));
+        }
+        let other = self.others_are_zero.then_some(0);
+        let found: Option<Vec<u16>> = asked.map(|address| self.registers.get(&address).copied().or(other)).collect();
+        let registers = found.ok_or(ModbusError::Refused(2))?;
+        let stamp = Stamp::from_exact_time(clock.now_ns());
+        Ok(ModbusResponse { pdu: pdu::encode_answer(block.table, &registers), stamp })
+    }
+
+    fn deadline(&self) -> Duration {
+        Duration::from_secs(1)
+    }
+
+    fn late_answers(&self) -> u64 {
+        0
+    }
+}
+
+struct Reader {
+    profile: Profile,
+    registers: Vec<MeterRegister>,
+    outputs: Vec<MeterChannel>,
+    poll: RegisterPoll,
+    check: SupplyCheck,
+}
+
+impl Reader {
+    fn new(profile: &Profile) -> Self {
+        let blocks = PollBlocks::from_registers(&profile.registers, profile.block_max, profile.block_gap);
+        Self {
+            profile: profile.clone(),
+            registers: profile.registers.clone(),
+            outputs: outputs::list_channels(profile, Circuit::Machine).expect("channels"),
+            poll: RegisterPoll::new(blocks.expect("blocks")),
+            check: SupplyCheck::default(),
+        }
+    }
+
+    /// The power of the machine, W.
+    fn read_power(&mut self, line: &mut Image, clock: &dyn Clock) -> Result<f64, Absence> {
+        self.poll.read(line, clock, 1).map_err(|_| Absence::Refused)?;
+        let mut doubts = self.check.judge_values(&outputs::collect_supply_values(&self.registers, &self.poll));
+        outputs::doubt_missing_witnesses(&self.profile, &self.poll, &mut doubts);
+        let power = self.outputs.iter().find(|output| output.channel.name() == "total_power_w");
+        let reading = power.ok_or(Absence::NotProvided)?.build_reading(&self.registers, &self.poll, &doubts);
+        reading.value.map(|value| value.as_number().unwrap_or(f64::NAN))
+    }
+}
+
+#[test]
+fn a_profile_on_another_map_is_right_or_absent() {
+    let profiles: Vec<Profile> =
+        SHIPPED.iter().map(|(name, _)| find_profile(name, None).unwrap_or_else(|error| panic!("{error}"))).collect();
+    let clock = ManualClock::with_time(0);
+    let (mut right, mut absent, mut wrong) = (0, 0, Vec::new());
+    for of_meter in &profiles {
+        for of_address in &profiles {
+            for others_are_zero in [false, true] {
+                let mut line = Image::from_profile(of_meter, others_are_zero);
+                let mut reader = Reader::new(of_address);
+                for _ in 0..3 {
+                    match reader.read_power(&mut line, &clock) {
+                        Ok(power) if (power - TOTAL_W).abs() <= 0.02 * TOTAL_W => right += 1,
+                        Ok(power) => wrong.push(format!("{} on {}: {power} W", of_address.name, of_meter.name)),
+                        Err(_) if of_meter.name == of_address.name && of_meter.name != "temperature8" => {
+                            wrong.push(format!("{} on its own map has no power", of_meter.name));
+                        }
+                        Err(_) => absent += 1,
+                    }
+                }
+            }
+        }
+    }
+    eprintln!("{right} right, {absent} absent, {} wrong", wrong.len());
+    assert_eq!(wrong, Vec::<String>::new(), "{right} right, {absent} absent");
+    assert!(right >= 48 && absent >= 300, "{right} right, {absent} absent");
+}
+
+#[test]
+fn what_a_meter_refuses_while_it_starts_is_asked_for_again() {
+    let clock = ManualClock::with_time(0);
+    let profile = find_profile("sdm630", None).expect("shipped");
+    let mut line = Image::from_profile(&profile, true);
+    line.refused = vec![52];
+    let mut reader = Reader::new(&profile);
+    for second in 0..120 {
+        clock.set_time(second * SECOND_NS);
+        if second == 4 {
+            line.refused.clear();
+        }
+        let power = reader.read_power(&mut line, &clock);
+        match second {
+            0..60 => assert_eq!(power, Err(Absence::NotSupported), "{second} s"),
+            _ => assert!(power.is_ok_and(|power| (power - TOTAL_W).abs() < 1.0), "{second} s: {power:?}"),
+        }
+    }
+}
