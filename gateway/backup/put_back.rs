@@ -33,7 +33,7 @@ impl std::fmt::Display for PutBack {
 }
 
 /// A file that is being replaced or removed.
-struct Place {
+struct ReplacedFile {
     path: PathBuf,
     /// Where what was there is kept; `None`: there was nothing.
     kept: Option<PathBuf>,
@@ -44,7 +44,7 @@ pub(super) struct Replacement {
     folder: PathBuf,
     fresh: Vec<(PathBuf, FreshFile)>,
     surplus: Vec<PathBuf>,
-    done: Vec<Place>,
+    done: Vec<ReplacedFile>,
 }
 
 impl Replacement {
@@ -100,12 +100,12 @@ impl Replacement {
             if let Err(error) = file.take_place(&path) {
                 return Err(RestoreError::File { path, error });
             }
-            self.done.push(Place { path, kept });
+            self.done.push(ReplacedFile { path, kept });
         }
         for path in std::mem::take(&mut self.surplus) {
             let kept = self.keep_before(&path)?;
             fs::remove_file(&path).map_err(say(&path))?;
-            self.done.push(Place { path, kept });
+            self.done.push(ReplacedFile { path, kept });
         }
         Ok(())
     }

@@ -100,7 +100,8 @@ fn an_empty_box_gets_everything_that_decides() {
         let each = |(name, text): ArchivedFile| {
             if name.ends_with("settings.toml") { (name, body(&text)) } else { (name, text) }
         };
-        files.into_iter().map(each).collect::<Vec<_>>()
+        // Which box it is of differs, too.
+        files.into_iter().filter(|(name, _)| name != "box.json").map(each).collect::<Vec<_>>()
     };
     assert_eq!(without_author(taken(&new)), without_author(first.clone()));
     restore_backup(&new, &first, ask("x-before-restore-2.tar.gz")).expect("again");

@@ -151,7 +151,7 @@ mod tests {
 
     /// The same on a disk; a user who is not root cannot make the files of two users.
     #[test]
-    #[ignore = "needs root: files of two users"]
+    #[ignore = "1 second: files of two users keep their owner; needs root"]
     fn what_root_leaves_in_a_directory_of_a_user_is_handed_over() {
         let directory = tempfile::tempdir().expect("a directory");
         let place = directory.path();

@@ -1,6 +1,6 @@
 //! Which gateway on this box a command is for, and how it answers. Shared by `arm`, `disarm`, `acknowledge` and `person`.
 
-use super::installed::note_data_dir;
+use super::installation::note_data_dir;
 use super::{CannotRun, load_configuration};
 use clap::Args;
 use std::path::PathBuf;

@@ -23,7 +23,7 @@ mod help_zh;
 mod history;
 mod history_upkeep;
 mod identify;
-mod installed;
+mod installation;
 mod lang;
 mod metrics;
 mod model;
@@ -47,7 +47,7 @@ use crate::reload::read_directory;
 use ::rules::physics::explain::Language;
 use ::rules::script::{Host, ScriptProblem, list_shipped_scripts};
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
-use installed::load_configuration;
+use installation::load_configuration;
 use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
@@ -180,7 +180,7 @@ pub fn main() -> ExitCode {
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     lang::choose_language(arguments.lang);
     let done = dispatch_command(arguments);
-    installed::hand_over_data();
+    installation::hand_over_data();
     log::flush();
     match done {
         Ok(CommandOutcome::Fine) => ExitCode::SUCCESS,

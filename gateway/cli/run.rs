@@ -1,6 +1,6 @@
 //! `cnc-gateway run`: the box, live.
 
-use super::installed::note_data_dir;
+use super::installation::note_data_dir;
 use super::{CannotRun, CommandOutcome, CommandResult, LogArguments};
 use crate::config;
 use crate::demo;

@@ -1,6 +1,6 @@
 //! `cnc-gateway setup`: the questions that a box needs answered, each tried at once, and the configuration from the answers.
 
-use super::installed::note_data_dir;
+use super::installation::note_data_dir;
 use super::{CannotRun, CommandOutcome, CommandResult, lang, print_text};
 use crate::access::{self, Persons};
 use crate::doctor;

@@ -147,7 +147,7 @@ fn an_update_on_a_disk_that_is_full_at_any_call_leaves_a_version_that_runs() {
 
 /// On a full disk the guard goes back all the same: it only renames and removes.
 #[test]
-#[ignore = "needs strace and the right to trace: every call of the guard that needs room on the disk fails"]
+#[ignore = "5 seconds: every call of the guard that needs room on the disk fails; needs strace and the right to trace"]
 fn the_guard_goes_back_on_a_full_disk() {
     let packaged = PackagedBox::started();
     packaged.set_mode("0.2.0", "hang");

@@ -47,7 +47,9 @@ for number in 1 2 3; do
   note restart-$number 0
 done
 for number in 1 2 3 4 5 6 7 8; do
-  kill -KILL "$(systemctl show -p MainPID --value cnc-gateway)"
+  # While the guard waits there is no process.
+  process=$(systemctl show -p MainPID --value cnc-gateway)
+  [ "$process" = 0 ] || kill -KILL "$process"
   sleep 2.5
 done
 settle
