@@ -79,7 +79,9 @@ fn note_formulas(book: &mut Book, sheet: &str, range: &Range<Data>, table: &mut 
             .used_cells()
             .filter(|(row, at, _)| {
                 let (row, at) = (*row as u64 + u64::from(formula_row), *at as u64 + u64::from(formula_column));
-                let here = usize::try_from(row.saturating_sub(u64::from(first_row))).unwrap_or(usize::MAX);
+                let Some(here) = row.checked_sub(u64::from(first_row)).and_then(|row| usize::try_from(row).ok()) else {
+                    return false;
+                };
                 at == column as u64 + u64::from(first_column) && !is_filled(here, column)
             })
             .count();
