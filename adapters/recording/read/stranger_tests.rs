@@ -9,7 +9,7 @@ fn read_bytes(bytes: &[u8], name: &str) -> Result<super::ReadRecording, super::R
     super::read_input(Input::from_memory(bytes.to_vec(), name), &Mapping::default())
 }
 
-/// 2026-03-17T08:15:00Z
+/// The first second of the files here: 2026-03-17T08:15:00Z.
 const START_NS: i64 = 1_773_735_300_000_000_000;
 
 #[test]
