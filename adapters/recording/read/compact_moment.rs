@@ -7,9 +7,9 @@ use adapter_core::clock::SECOND_NS;
 /// Which moment digits alone may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum CompactKind {
-    /// Date and time.
+    /// A date with its time of day.
     Moment,
-    /// A date alone.
+    /// A date without a time of day.
     Date,
     /// A time of day alone.
     TimeOfDay,

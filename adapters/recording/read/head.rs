@@ -46,7 +46,7 @@ pub(super) struct HeadTime {
     pub(super) step_s: f64,
 }
 
-/// Line and cells.
+/// The line of a row in the file, and its cells.
 pub(super) type HeadRow = (u64, Vec<OwnedCell>);
 
 /// What a map says of the head.
@@ -54,7 +54,7 @@ pub(super) type HeadRow = (u64, Vec<OwnedCell>);
 pub(super) struct GivenHead<'m> {
     /// Line of the names,
     pub(super) names: Option<u64>,
-    /// of the units,
+    /// that of the units of the columns,
     pub(super) units: Option<u64>,
     /// or the names themselves, where no line holds them.
     pub(super) list: &'m [String],

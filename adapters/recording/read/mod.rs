@@ -182,4 +182,6 @@ fn read_understood(
 }
 
 #[cfg(test)]
+mod stranger_tests;
+#[cfg(test)]
 mod tests;

@@ -3,20 +3,20 @@
 use super::*;
 use crate::Recording;
 
-fn read(text: &str) -> Result<ReadRecording, RecordingError> {
+pub(super) fn read(text: &str) -> Result<ReadRecording, RecordingError> {
     read_csv(text.as_bytes(), "t.csv")
 }
 
-fn under(text: &str, map: &str) -> Result<ReadRecording, RecordingError> {
+pub(super) fn under(text: &str, map: &str) -> Result<ReadRecording, RecordingError> {
     let mapping = Mapping::parse(&format!("schema = \"map/1\"\n{map}"), "map").expect("a map");
     read_input(Input::from_memory(text.as_bytes().to_vec(), "t.csv"), &mapping)
 }
 
-fn told(read: &ReadRecording) -> String {
+pub(super) fn told(read: &ReadRecording) -> String {
     read.notes.iter().map(|note| note.text.en.clone()).collect::<Vec<_>>().join("\n")
 }
 
-fn column(recording: &Recording, name: &str) -> Vec<Option<f64>> {
+pub(super) fn column(recording: &Recording, name: &str) -> Vec<Option<f64>> {
     recording.find_numbers(name).unwrap_or_else(|| panic!("no column {name}")).iter().collect()
 }
 
@@ -195,5 +195,3 @@ proptest::proptest! {
         let _ = read_input(Input::from_memory(all, "f"), &Mapping::default());
     }
 }
-
-mod strangers;

@@ -91,7 +91,7 @@ fn find_scale(column: &ColumnDescriptor) -> Option<i32> {
     is_decimal.then(|| column.type_scale())
 }
 
-/// Days since 1970.
+/// Does the column hold days since 1970?
 fn is_date(column: &ColumnDescriptor) -> bool {
     matches!(column.logical_type_ref(), Some(LogicalType::Date)) || column.converted_type() == ConvertedType::DATE
 }

@@ -30,14 +30,14 @@ fn is_entry(line: &str) -> bool {
 }
 
 #[derive(Default)]
-struct Item {
+struct LoggedItem {
     times: Vec<OwnedCell>,
     values: Vec<OwnedCell>,
 }
 
 /// Reads every line of a text that is decoded.
 pub(super) fn open(text: impl Read, file: &str) -> Result<ColumnTable, RecordingError> {
-    let mut items: Vec<(String, Item)> = Vec::new();
+    let mut items: Vec<(String, LoggedItem)> = Vec::new();
     let mut known: HashMap<String, usize> = HashMap::new();
     let mut cells = 0;
     for line in BufReader::new(text).lines() {
@@ -50,7 +50,7 @@ pub(super) fn open(text: impl Read, file: &str) -> Result<ColumnTable, Recording
         parts.truncate(if is_condition { 3 } else { parts.len() });
         for pair in parts[1..].chunks_exact(2) {
             let place = *known.entry(pair[0].to_owned()).or_insert_with(|| {
-                items.push((pair[0].to_owned(), Item::default()));
+                items.push((pair[0].to_owned(), LoggedItem::default()));
                 items.len() - 1
             });
             let is_absent = pair[1].eq_ignore_ascii_case("UNAVAILABLE");

@@ -292,11 +292,9 @@ fn convert_moment(at: ExcelDateTime) -> OwnedCell {
     }
     // A workbook that counts from 1904 says so; the library then adds its 1,462 days in the date and not in the number.
     let (year, month, day, ..) = at.to_ymd_hms_milli();
-    let date = jiff::civil::Date::new(
-        i16::try_from(year).unwrap_or(0),
-        i8::try_from(month).unwrap_or(0),
-        i8::try_from(day).unwrap_or(0),
-    );
+    let (month, day) = (i8::try_from(month).ok(), i8::try_from(day).ok());
+    let parts = i16::try_from(year).ok().zip(month).zip(day);
+    let date = parts.and_then(|((year, month), day)| jiff::civil::Date::new(year, month, day).ok());
     let shift_days = date.map_or(0.0, |date| {
         let counted =
             f64::from((date - jiff::civil::Date::constant(1970, 1, 1)).get_days()) - (days - EPOCH_DAYS).floor();

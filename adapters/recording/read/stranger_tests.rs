@@ -1,15 +1,15 @@
 //! Files as loggers, offices and vendors write them, read to the values that stand in them.
 
-use super::{column, read, told, under};
+use super::tests::{column, read, told, under};
 use crate::Mapping;
 use crate::read::input::Input;
 
 /// Reads bytes of any format.
-fn read_bytes(bytes: &[u8], name: &str) -> Result<super::super::ReadRecording, super::super::RecordingError> {
-    super::super::read_input(Input::from_memory(bytes.to_vec(), name), &Mapping::default())
+fn read_bytes(bytes: &[u8], name: &str) -> Result<super::ReadRecording, super::RecordingError> {
+    super::read_input(Input::from_memory(bytes.to_vec(), name), &Mapping::default())
 }
 
-/// 2026-03-17T08:15:00Z
+/// The first second of the files here: 2026-03-17T08:15:00Z.
 const START_NS: i64 = 1_773_735_300_000_000_000;
 
 #[test]
