@@ -117,7 +117,7 @@ fn run_day(seed: u64, air_c: f64, sensor: usize, spoil: impl Fn(f64, f64) -> Opt
 
 #[test]
 fn a_sensor_that_is_lost_jumps_or_freezes_is_told_and_the_error_stays_below_the_uncompensated_one() {
-    for sensor in 0..3 {
+    for (sensor, sensor_name) in NAMES.into_iter().enumerate() {
         for seed in 10..14 {
             let lost = run_day(seed, 20.0, sensor, |_, _| None);
             let jump = run_day(seed, 20.0, sensor, |_, _| Some(85.0));
@@ -129,7 +129,7 @@ fn a_sensor_that_is_lost_jumps_or_freezes_is_told_and_the_error_stays_below_the_
                 ("15 K more", &higher, SensorFault::Jumped, 0),
                 ("frozen", &frozen, SensorFault::Frozen, 2 * 3600),
             ] {
-                println!("{name} {} seed {seed}: {day:?}", NAMES[sensor]);
+                println!("{name} {sensor_name} seed {seed}: {day:?}");
                 assert_eq!(day.false_doubts, 0, "{name} {sensor} {seed}");
                 assert!(day.compensated_um.0 < day.uncompensated_um.0, "{name} {sensor} {seed}: {day:?}");
                 assert!(day.compensated_um.1 < day.uncompensated_um.1, "{name} {sensor} {seed}: {day:?}");
