@@ -121,7 +121,7 @@ fn the_one_that_was_just_taken_stays_whatever_the_others_are_dated() {
     for (at_s, text) in [(YEAR_2036_S, "of a wrong clock"), (BEGIN_S, "right"), (5, "of a clock without a battery")] {
         tried.change(text);
         let taken = take_backup(&tried.paths, &config(share.path(), 1), at_s).expect("taken");
-        assert_eq!(tried.archives(share.path()), [taken.clone()], "{text}");
+        assert_eq!(tried.archives(share.path()), std::slice::from_ref(&taken), "{text}");
         assert_eq!(tried.restore_elsewhere(&taken), format!("// {text}"));
     }
 }

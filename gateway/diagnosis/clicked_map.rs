@@ -79,7 +79,7 @@ impl ClickedMap {
             columns: columns.collect(),
             time: said(&self.time),
             step: self.step,
-            found: found.clone(),
+            time_preview: found.clone(),
             base,
         };
         proposal.to_toml(&Bilingual::default(), "the file")

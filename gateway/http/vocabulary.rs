@@ -28,7 +28,7 @@ pub const ESTIMATES: [(&str, &str, &str, &str); 15] = [
 ];
 
 /// Why an estimate is missing: word, English, Chinese. The full reason stands beside the estimate.
-const NO_ESTIMATES: [(&str, &str, &str); 29] = [
+const NO_ESTIMATES: [(&str, &str, &str); 31] = [
     ("not_yet", "no sample yet", "尚无采样"),
     ("input_missing", "an input is missing", "缺少输入"),
     ("spindle_stopped", "spindle stands still", "主轴静止"),

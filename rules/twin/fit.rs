@@ -203,6 +203,9 @@ impl<'a> Linearised<'a> {
 /// Parts that have moved, what they simulate, and the error they leave.
 type Moved = (Vec<Part>, Simulated, f64);
 
+/// The sum of squares of parts with a correction of the step.
+type ErrorSum<'a> = &'a dyn Fn(&[Part], &[f64]) -> f64;
+
 /// Goes the step, or as much of it as makes the error smaller; nothing where no share of it does.
 fn search_step_length(
     scene: &mut Scene,
@@ -210,7 +213,7 @@ fn search_step_length(
     free: &[Free],
     step: &[f64],
     metric: &Metric<'_>,
-    (error, sum): (f64, &dyn Fn(&[Part], &[f64]) -> f64),
+    (error, sum): (f64, ErrorSum<'_>),
 ) -> Option<Option<Moved>> {
     for share in SHARES {
         let mut moved = parts.to_vec();

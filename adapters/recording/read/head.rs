@@ -66,8 +66,8 @@ impl<'m> GivenHead<'m> {
     }
 }
 
-/// Looks at the first rows.
-pub(super) fn find_head(table: &dyn Table, given: GivenHead<'_>, file: &str) -> Result<Head, RecordingError> {
+/// The first rows that are no annotation.
+fn collect_head_rows(table: &dyn Table) -> Result<Vec<HeadRow>, RecordingError> {
     let mut rows: Vec<HeadRow> = Vec::new();
     let mut is_annotated = false;
     table.visit_rows(&mut |row| {
@@ -80,6 +80,12 @@ pub(super) fn find_head(table: &dyn Table, given: GivenHead<'_>, file: &str) -> 
         }
         Ok(if rows.len() < HEAD_ROWS { VisitStep::Next } else { VisitStep::Enough })
     })?;
+    Ok(rows)
+}
+
+/// Looks at the first rows.
+pub(super) fn find_head(table: &dyn Table, given: GivenHead<'_>, file: &str) -> Result<Head, RecordingError> {
+    let rows = collect_head_rows(table)?;
     if rows.is_empty() {
         return Err(RecordingError::Empty { file: file.to_owned(), problems: Vec::new() });
     }

@@ -49,14 +49,8 @@ impl ForeignColumns<'_> {
             return Ok(TimeKind::Days { decimal, factor: 1e-6 });
         }
         if let Some(unit) = unit {
-            let known = Unit::from_symbol(&unit).filter(|unit| unit.dimension == Dimension::Time);
-            let known = known.ok_or_else(|| {
-                self.build_header_error(
-                    format!("the unit {unit} of the time column {} is none of time", name.text),
-                    format!("时间列{}的单位{unit}不是时间单位", name.text),
-                )
-            })?;
-            return Ok(TimeKind::Seconds { decimal, factor: known.factor, offset_s: 0.0 });
+            let factor = self.find_time_factor(&unit, &name.text)?;
+            return Ok(TimeKind::Seconds { decimal, factor, offset_s: 0.0 });
         }
         if self.looks_like_days(index) {
             say(
@@ -91,6 +85,17 @@ impl ForeignColumns<'_> {
         }
         say(format!("{} in seconds", name.text), format!("{}以秒为单位", name.text));
         Ok(TimeKind::Seconds { decimal, factor: 1.0, offset_s: 0.0 })
+    }
+
+    /// Seconds of a unit of time.
+    fn find_time_factor(&self, unit: &str, name: &str) -> Result<f64, RecordingError> {
+        let known = Unit::from_symbol(unit).filter(|unit| unit.dimension == Dimension::Time);
+        known.map(|known| known.factor).ok_or_else(|| {
+            self.build_header_error(
+                format!("the unit {unit} of the time column {name} is none of time"),
+                format!("时间列{name}的单位{unit}不是时间单位"),
+            )
+        })
     }
 
     /// Spreadsheet days: of this century, and their steps are round in seconds but not as they stand.

@@ -30,9 +30,9 @@ pub(super) fn divide_at(stretches: Vec<std::ops::Range<usize>>, rows: &[usize]) 
 /// The runs where a new one begins with each restart of the clock: numbered, behind the name that the file gives them.
 pub(super) fn name_runs(named: Option<&Words>, restarts: &[usize], kept: &[bool]) -> Words {
     let (mut runs, mut place, mut number) = (Words::default(), 0, 1);
-    for row in 0..kept.len() {
+    for (row, is_kept) in kept.iter().enumerate() {
         number += usize::from(restarts.binary_search(&row).is_ok());
-        if !kept[row] {
+        if !is_kept {
             continue;
         }
         match named.and_then(|named| named.get(place)) {

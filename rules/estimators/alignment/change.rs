@@ -65,7 +65,7 @@ impl LagWatch {
             (before.lag_s - found.lag_s).abs() <= AGREE_S.max(AGREE_SHARE * found.off_s.abs())
                 && before.off_s * found.off_s > 0.0
         };
-        let Some(before) = self.before.replace(found).filter(agrees) else { return None };
+        let before = self.before.replace(found).filter(agrees)?;
         self.before = None;
         Some(LagChange { from_s: known.lag_s, to_s: 0.5 * (before.lag_s + found.lag_s), since_s: before.middle_s })
     }

@@ -204,36 +204,26 @@ impl TdmsFile {
         }
     }
 
-    fn into_table(self, input: &Input, group: Option<&str>) -> Result<ColumnTable, RecordingError> {
-        let groups: Vec<String> = {
-            let mut all: Vec<String> = Vec::new();
-            for channel in self.channels.iter().filter(|channel| channel.values.len() > 0 && channel.path.len() == 2) {
-                if !all.contains(&channel.path[0]) {
-                    all.push(channel.path[0].clone());
-                }
+    /// Groups that have a channel with values, in the order of the file.
+    fn list_groups(&self) -> Vec<String> {
+        let mut groups: Vec<String> = Vec::new();
+        for channel in self.channels.iter().filter(|channel| channel.values.len() > 0 && channel.path.len() == 2) {
+            if !groups.contains(&channel.path[0]) {
+                groups.push(channel.path[0].clone());
             }
-            all
-        };
-        let Some(first) = groups.first() else {
-            return Err(RecordingError::with_format_reason(
-                &input.file,
-                "the TDMS file has no channel with values",
-                "TDMS文件没有带数值的通道",
-            ));
-        };
-        let chosen = group.map_or_else(
-            || Ok(first.clone()),
-            |asked| {
-                groups.iter().find(|name| *name == asked).cloned().ok_or_else(|| {
-                    let list = groups.join(", ");
-                    RecordingError::with_format_reason(
-                        &input.file,
-                        format!("there is no group {asked}; there are {list}"),
-                        format!("没有组{asked}；现有：{list}"),
-                    )
-                })
-            },
-        )?;
+        }
+        groups
+    }
+
+    /// Scales of the groups and of the file.
+    fn list_inherited_scaling(&self) -> Vec<ObjectScaling> {
+        let above = self.channels.iter().filter(|object| object.path.len() < 2);
+        above.map(|object| ObjectScaling { path: object.path.clone(), scaling: object.scaling.clone() }).collect()
+    }
+
+    fn into_table(self, input: &Input, group: Option<&str>) -> Result<ColumnTable, RecordingError> {
+        let groups = self.list_groups();
+        let chosen = choose_group(&groups, group, input)?;
         let mut form = vec![Bilingual::new("TDMS", "TDMS")];
         if groups.len() > 1 {
             form.push(Bilingual::new(
@@ -241,12 +231,7 @@ impl TdmsFile {
                 format!("组{chosen}（共有{}）", groups.join("、")),
             ));
         }
-        let inherited = self
-            .channels
-            .iter()
-            .filter(|object| object.path.len() < 2)
-            .map(|object| (object.path.clone(), object.scaling.clone()))
-            .collect::<Vec<_>>();
+        let inherited = self.list_inherited_scaling();
         let mut columns: Vec<(String, ColumnCells)> = Vec::new();
         let mut clock: Option<WaveformClock> = None;
         for channel in self
@@ -263,17 +248,7 @@ impl TdmsFile {
             let name = channel.unit.as_ref().map_or_else(|| name.clone(), |unit| format!("{name} [{unit}]"));
             let cells = match channel.values {
                 TdmsValues::Numbers(values) => {
-                    // What a channel does not say, its group says, and what that does not, the file.
-                    let of = |length: usize| {
-                        inherited
-                            .iter()
-                            .find(|(path, _)| path[..] == channel.path[..length])
-                            .map(|(_, scaling)| scaling)
-                    };
-                    let scaling = Some(&channel.scaling).filter(|scaling| scaling.says_something());
-                    let above = || (0..2).rev().filter_map(of).find(|scaling| scaling.says_something());
-                    let scaled = scaling
-                        .or_else(above)
+                    let scaled = find_scaling(&channel.path, &channel.scaling, &inherited)
                         .map_or_else(|| Ok(values.clone()), |scaling| scaling.scale_values(&values));
                     ColumnCells::Numbers(scaled.map_err(|kind| {
                         RecordingError::with_format_reason(
@@ -291,4 +266,36 @@ impl TdmsFile {
         }
         Ok(ColumnTable { columns, form, ..ColumnTable::default() })
     }
+}
+
+/// The scale of a group or of the file.
+struct ObjectScaling {
+    path: Vec<String>,
+    scaling: TdmsScaling,
+}
+
+/// The scale of a channel: what it does not say, its group says, and what that does not, the file.
+fn find_scaling<'a>(path: &[String], own: &'a TdmsScaling, inherited: &'a [ObjectScaling]) -> Option<&'a TdmsScaling> {
+    let of_length = |length: usize| inherited.iter().find(|object| object.path[..] == path[..length]);
+    let above = (0..2).rev().filter_map(of_length).map(|object| &object.scaling);
+    std::iter::once(own).chain(above).find(|scaling| scaling.says_something())
+}
+
+fn choose_group(groups: &[String], asked: Option<&str>, input: &Input) -> Result<String, RecordingError> {
+    let Some(first) = groups.first() else {
+        return Err(RecordingError::with_format_reason(
+            &input.file,
+            "the TDMS file has no channel with values",
+            "TDMS文件没有带数值的通道",
+        ));
+    };
+    let Some(asked) = asked else { return Ok(first.clone()) };
+    groups.iter().find(|name| *name == asked).cloned().ok_or_else(|| {
+        let list = groups.join(", ");
+        RecordingError::with_format_reason(
+            &input.file,
+            format!("there is no group {asked}; there are {list}"),
+            format!("没有组{asked}；现有：{list}"),
+        )
+    })
 }
