@@ -14,9 +14,9 @@ use serde_json::Value;
 /// A time that is not told in milliseconds since 1970.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ForeignClock {
-    /// Microseconds since 1970.
+    /// A number of microseconds since 1970.
     Microseconds,
-    /// Nanoseconds since 1970.
+    /// A number of nanoseconds since 1970.
     Nanoseconds,
     /// Seconds since 1970, with a fraction.
     Seconds,

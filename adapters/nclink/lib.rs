@@ -9,7 +9,7 @@
 //! | `message` | query and set: requests as JSON, answers as values or reasons |
 //! | `model` | the answer to a probe: data items with their paths, sample channels |
 //! | `sample`, `begin_time` | one message of a sample channel: columns of values, their times |
-//! | `measured` | what a number of an item is in the unit of a channel, polled or sampled |
+//! | `item_conversion` | what a number of an item is in the unit of a channel, polled or sampled |
 //! | `map`, `own_path` | which data item feeds which channel, in which unit; what the user can have read |
 //! | `decode` | state words from the status item and from the channel's F register |
 //! | `connection` | one client at the broker: probe, query, set, by request identifier |
@@ -55,10 +55,10 @@ pub mod address;
 mod begin_time;
 pub mod connection;
 mod decode;
+pub mod item_conversion;
 pub mod lenient_json;
 pub mod mailbox;
 mod map;
-pub mod measured;
 pub mod message;
 pub mod model;
 pub mod offset_mailbox;

@@ -6,8 +6,8 @@
 //! read = "0103532105"                      read = "CONTROLLER/VARIABLE@REG_X 12.3"
 //! ```
 
+use super::item_conversion::ItemConversion;
 use super::lenient_json::parse_integer;
-use super::measured::ItemConversion;
 use super::message::NcLinkAnswer;
 use adapter_core::channel::Kind;
 use adapter_core::own::{OwnChannel, OwnRead};

@@ -1,8 +1,8 @@
 //! One message of a sample channel: a column of values per item, and when they were true on the device's clock.
 
 use super::begin_time::{BeginTime, ForeignClock, parse_begin};
+use super::item_conversion::{ItemConversion, UnitProblem, split_unit};
 use super::lenient_json::{find_field, find_list, find_text, parse_number};
-use super::measured::{ItemConversion, UnitProblem, split_unit};
 use super::model::Model;
 use serde_json::Value;
 use thiserror::Error;

@@ -17,7 +17,8 @@ pub struct FirstToken {
     /// Until when it signs in, seconds since 1970.
     pub until_s: u64,
     /// It has signed in.
-    pub used: bool,
+    #[serde(rename = "used")]
+    pub has_signed_in: bool,
 }
 
 impl FirstToken {
@@ -27,7 +28,7 @@ impl FirstToken {
     /// May it sign in at this time, seconds since 1970?
     #[must_use]
     pub fn is_valid_at(&self, now_s: u64) -> bool {
-        !self.used && now_s < self.until_s
+        !self.has_signed_in && now_s < self.until_s
     }
 }
 
@@ -101,7 +102,7 @@ mod tests {
         for _ in 0..2 {
             assert!(access.sign_in("admin", &own, HERE).await.is_ok(), "a token of one's own lasts");
         }
-        let first = FirstToken { until_s: 100, used: false };
+        let first = FirstToken { until_s: 100, has_signed_in: false };
         assert!(first.is_valid_at(99) && !first.is_valid_at(100));
     }
 

@@ -195,7 +195,7 @@ impl Persons {
     pub fn add_first(&mut self, now_s: u64) -> Result<Token, PersonsError> {
         let token = self.add(FIRST, Role::Admin, "the first start")?;
         self.find_entry_mut(FIRST)?.first =
-            Some(FirstToken { until_s: now_s.saturating_add(FirstToken::LASTS_S), used: false });
+            Some(FirstToken { until_s: now_s.saturating_add(FirstToken::LASTS_S), has_signed_in: false });
         Ok(token)
     }
 
@@ -216,7 +216,7 @@ impl Persons {
     /// The token of the first start has signed in.
     pub(super) fn mark_first_used(&mut self, name: &str) {
         if let Ok(PersonEntry { first: Some(first), .. }) = self.find_entry_mut(name) {
-            first.used = true;
+            first.has_signed_in = true;
         }
     }
 

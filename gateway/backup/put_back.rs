@@ -36,7 +36,7 @@ impl std::fmt::Display for PutBack {
 struct ReplacedFile {
     path: PathBuf,
     /// Where what was there is kept; `None`: there was nothing.
-    kept: Option<PathBuf>,
+    path_before: Option<PathBuf>,
 }
 
 /// Files on their way to their places.
@@ -100,12 +100,12 @@ impl Replacement {
             if let Err(error) = file.take_place(&path) {
                 return Err(RestoreError::File { path, error });
             }
-            self.done.push(ReplacedFile { path, kept });
+            self.done.push(ReplacedFile { path, path_before: kept });
         }
         for path in std::mem::take(&mut self.surplus) {
             let kept = self.keep_before(&path)?;
             fs::remove_file(&path).map_err(say(&path))?;
-            self.done.push(ReplacedFile { path, kept });
+            self.done.push(ReplacedFile { path, path_before: kept });
         }
         Ok(())
     }
@@ -131,7 +131,7 @@ impl Replacement {
         let count = self.done.len();
         let mut left = Vec::new();
         for place in self.done.into_iter().rev() {
-            let back = match &place.kept {
+            let back = match &place.path_before {
                 Some(kept) => fs::rename(kept, &place.path),
                 None => fs::remove_file(&place.path),
             };

@@ -248,13 +248,13 @@ fn find_limit(paths: &BackupPaths, config: &BackupConfig) -> Duration {
 enum Attempted {
     NotDue,
     Taken(PathBuf),
-    /// The box ends.
+    /// The box ends before the backup is complete.
     Stopped,
 }
 
 /// A backup on a thread of its own, which a target that hangs may hold for ever. There is one at a time.
 struct BackupAttempt {
-    ended: Receiver<Result<Attempted, BackupError>>,
+    result: Receiver<Result<Attempted, BackupError>>,
     directory: PathBuf,
 }
 
@@ -275,7 +275,7 @@ impl BackupAttempt {
         };
         let thread = std::thread::Builder::new().name("backup work".to_owned()).spawn(work);
         let path = directory.clone();
-        thread.map(|_| Self { ended, directory }).map_err(|error| BackupError::File { path, error })
+        thread.map(|_| Self { result: ended, directory }).map_err(|error| BackupError::File { path, error })
     }
 
     /// Waits for its end. When it takes longer than `limit` that is told once, and it is waited for all the same: another one would hang,
@@ -288,7 +288,7 @@ impl BackupAttempt {
     ) -> Result<Attempted, BackupError> {
         let (began, mut told) = (Instant::now(), false);
         loop {
-            match self.ended.recv_timeout(WAIT_STEP) {
+            match self.result.recv_timeout(WAIT_STEP) {
                 Ok(done) => return done,
                 Err(RecvTimeoutError::Disconnected) => return Err(BackupError::BrokeOff(self.directory)),
                 Err(RecvTimeoutError::Timeout) => {}
@@ -313,7 +313,7 @@ mod tests {
     #[test]
     fn a_target_that_hangs_is_told_once_and_the_box_can_end() {
         let (end, ended) = channel();
-        let attempt = BackupAttempt { ended, directory: "/media/share".into() };
+        let attempt = BackupAttempt { result: ended, directory: "/media/share".into() };
         let (stop, stopped) = channel::<()>();
         let (tell, told) = channel();
         let waits = std::thread::spawn(move || {

@@ -194,7 +194,7 @@ pub fn replace_privately(path: &Path, text: &str) -> std::io::Result<()> {
 enum Readers {
     /// Those who could before; of a new file, as the process makes files.
     AsBefore,
-    /// Its owner alone.
+    /// The owner of the file and nobody else, whoever could before.
     OwnerAlone,
 }
 

@@ -26,8 +26,8 @@ pub(super) struct CheckArguments {
     #[arg(long, group = "print")]
     vocabulary: bool,
     /// Within the limits of a process that reads for the page. Never given by a person.
-    #[arg(long, hide = true)]
-    limited: bool,
+    #[arg(long = "limited", hide = true)]
+    has_limits: bool,
 }
 
 /// Checks, or prints a table.
@@ -57,7 +57,7 @@ fn read_declared_settings(config: Option<&Path>) -> Result<Vec<Declared>, Cannot
 }
 
 fn report_problems(arguments: &CheckArguments) -> CommandResult {
-    if arguments.limited {
+    if arguments.has_limits {
         gateway_base::limits::limit_memory_and_processor();
     }
     let unreadable = arguments.config.as_deref().filter(|path| std::fs::File::open(path).is_err());

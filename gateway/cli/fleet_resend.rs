@@ -89,7 +89,7 @@ pub(super) async fn resend_stretch(arguments: &ResendArguments) -> CommandResult
     }
     resender.close().await;
     reading.await.map_err(to_cannot_run)?.map_err(to_cannot_run)?;
-    let (sent, refused, seconds) = (resender.sent, resender.refused, began.elapsed().as_secs_f64());
+    let (sent, refused, seconds) = (resender.sent_count, resender.refused_count, began.elapsed().as_secs_f64());
     print_text(&format!("{sent} items sent in {seconds:.1} s, {refused} refused\n"));
     Ok(CommandOutcome::Fine)
 }

@@ -81,7 +81,7 @@ pub enum RequestRefusal {
     /// The same id has come before.
     #[error("the request {id:?} has come before: give each one an id of its own")]
     Repeated {
-        /// The asker's mark.
+        /// The mark by which the asker tells its requests apart.
         id: String,
     },
     /// A metric that a host may not write.

@@ -99,7 +99,7 @@ pub enum ChildMessage {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum ChildJob {
-    /// A diagnosis.
+    /// What a recording says about a model, by the twin.
     Diagnosis(Box<DiagnosisJob>),
     /// How a file is understood.
     Preview(PreviewJob),

@@ -175,7 +175,9 @@ impl FileDiagnoses {
     pub fn propose_map(&self, file: &BroughtFile, clicked: &ClickedMap) -> Result<String, MapRefusal> {
         let path = self.directory.join(&file.key).join("data");
         let read = || preview::propose_in_child(&path, &file.name, clicked);
-        self.with_reading(|| None, read).map_err(|FilesBusy| MapRefusal::Busy)?.map_err(MapRefusal::Refused)
+        self.with_reading(|| None, read)
+            .map_err(|FilesBusy| MapRefusal::Busy)?
+            .map_err(|refusal| MapRefusal::Refused(refusal.to_string()))
     }
 
     /// What is known already, or what a child says when it is this one's turn.

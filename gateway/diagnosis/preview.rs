@@ -15,6 +15,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::time::Duration;
+use thiserror::Error;
 
 /// The child ends itself after this time on the wall, however busy the box is.
 const WALL_MAX: Duration = Duration::from_secs(50);
@@ -33,7 +34,7 @@ pub struct PreviewJob {
     name: String,
     /// A map that a person clicked, to be read back; without it the file is described.
     #[serde(default)]
-    clicked: Option<ClickedMap>,
+    clicked_map: Option<ClickedMap>,
 }
 
 /// The child: reads the file and writes one line.
@@ -43,7 +44,7 @@ pub(super) fn run_job(job: &PreviewJob) -> std::io::Result<()> {
         std::thread::sleep(WALL_MAX);
         std::process::exit(3);
     })?;
-    let document = match &job.clicked {
+    let document = match &job.clicked_map {
         Some(clicked) => propose_map(&job.preview, clicked),
         None => build_document(&job.preview, &job.name),
     };
@@ -61,15 +62,31 @@ pub(super) fn describe_in_child(path: &Path, name: &str) -> Value {
     document
 }
 
+/// Why a map that a person clicked is not kept.
+#[derive(Debug, PartialEq, Eq, Error)]
+pub(super) enum ProposalRefusal {
+    /// The child gave no answer.
+    #[error("{}", .0.en)]
+    NoAnswer(Bilingual),
+    /// The child read the file back under the map and refuses it, for this reason.
+    #[error("{0}")]
+    Refused(String),
+    /// The child answered without a map and without a reason.
+    #[error("the file could not be read")]
+    Unreadable,
+}
+
 /// The map that a person clicked, as text, read back in a child.
 ///
 /// # Errors
-/// Why it is not kept, in words.
-pub(super) fn propose_in_child(path: &Path, name: &str, clicked: &ClickedMap) -> Result<String, String> {
-    let document = ask_child(path, name, Some(clicked)).map_err(|why| why.en)?;
+/// See [`ProposalRefusal`].
+pub(super) fn propose_in_child(path: &Path, name: &str, clicked: &ClickedMap) -> Result<String, ProposalRefusal> {
+    let document = ask_child(path, name, Some(clicked)).map_err(ProposalRefusal::NoAnswer)?;
     match document["toml"].as_str() {
         Some(toml) => Ok(toml.to_owned()),
-        None => Err(document["refused"].as_str().unwrap_or("the file could not be read").to_owned()),
+        None => Err(document["refused"]
+            .as_str()
+            .map_or(ProposalRefusal::Unreadable, |why| ProposalRefusal::Refused(why.to_owned()))),
     }
 }
 
@@ -87,8 +104,11 @@ fn read_map_beside(path: &Path) -> Mapping {
 
 /// Why a child gave no answer.
 fn ask_child(path: &Path, name: &str, clicked: Option<&ClickedMap>) -> Result<Value, Bilingual> {
-    let job =
-        ChildJob::Preview(PreviewJob { preview: path.to_owned(), name: name.to_owned(), clicked: clicked.cloned() });
+    let job = ChildJob::Preview(PreviewJob {
+        preview: path.to_owned(),
+        name: name.to_owned(),
+        clicked_map: clicked.cloned(),
+    });
     let broken = |error: std::io::Error| {
         Bilingual::new(format!("no process to read it with: {error}"), format!("无法启动读取进程：{error}"))
     };

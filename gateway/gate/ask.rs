@@ -67,7 +67,7 @@ struct StandingRequest {
     /// It waits until the one that is latched has been seen to.
     waits: bool,
 }
-const EXECUTION: ChannelId = ChannelId::named("execution");
+const EXECUTION: ChannelId = ChannelId::find_constant("execution");
 
 /// One kind of request.
 #[derive(Debug, Clone, Default)]

@@ -102,16 +102,16 @@ impl fmt::Display for Hold {
     }
 }
 
-const MODE: ChannelId = ChannelId::named("mode");
-const EXECUTION: ChannelId = ChannelId::named("execution");
-const FEED: ChannelId = ChannelId::named("feed_mm_min");
-const SPEED: ChannelId = ChannelId::named("spindle_speed_rpm");
-const ALARM: ChannelId = ChannelId::named("alarm");
-const RAPID: ChannelId = ChannelId::named("rapid");
-const SINGLE_BLOCK: ChannelId = ChannelId::named("single_block");
-const DRY_RUN: ChannelId = ChannelId::named("dry_run");
-const OPERATION: ChannelId = ChannelId::named("operation");
-const BLOCK: ChannelId = ChannelId::named("block");
+const MODE: ChannelId = ChannelId::find_constant("mode");
+const EXECUTION: ChannelId = ChannelId::find_constant("execution");
+const FEED: ChannelId = ChannelId::find_constant("feed_mm_min");
+const SPEED: ChannelId = ChannelId::find_constant("spindle_speed_rpm");
+const ALARM: ChannelId = ChannelId::find_constant("alarm");
+const RAPID: ChannelId = ChannelId::find_constant("rapid");
+const SINGLE_BLOCK: ChannelId = ChannelId::find_constant("single_block");
+const DRY_RUN: ChannelId = ChannelId::find_constant("dry_run");
+const OPERATION: ChannelId = ChannelId::find_constant("operation");
+const BLOCK: ChannelId = ChannelId::find_constant("block");
 
 /// What a decision needs to know of the machine that is written to: only that machine itself can tell it.
 pub const EVIDENCE: [ChannelId; 10] =
@@ -122,8 +122,11 @@ const NEEDED: [ChannelId; 4] = [MODE, EXECUTION, FEED, SPEED];
 /// A controller may not have these at all; one that has them and is silent is another matter.
 const OPTIONAL: [ChannelId; 5] = [ALARM, RAPID, OPERATION, SINGLE_BLOCK, DRY_RUN];
 /// One of these has to be measured.
-const LOADS: [ChannelId; 3] =
-    [ChannelId::named("spindle_power_w"), ChannelId::named("spindle_current_a"), ChannelId::named("spindle_load_pct")];
+const LOADS: [ChannelId; 3] = [
+    ChannelId::find_constant("spindle_power_w"),
+    ChannelId::find_constant("spindle_current_a"),
+    ChannelId::find_constant("spindle_load_pct"),
+];
 /// Switches of the operator that hold while they are on.
 const SWITCHES: [(ChannelId, Hold); 2] = [(SINGLE_BLOCK, Hold::SingleBlock), (DRY_RUN, Hold::DryRun)];
 

@@ -262,7 +262,7 @@ impl Gate {
     }
 }
 
-const DIAL: ChannelId = ChannelId::named("feed_override_dial_pct");
+const DIAL: ChannelId = ChannelId::find_constant("feed_override_dial_pct");
 
 /// The longest time between two decisions over which the slew limit still counts; after more, it begins at 100 %.
 const PAUSE_NS: i64 = SECOND_NS;

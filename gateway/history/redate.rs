@@ -82,8 +82,8 @@ pub fn set_clock(path: &Path, mark: &ClockMark, decided_ns: Option<TimeNs>) -> R
             by_ns: (least.min(segment.by_ns), greatest.max(segment.by_ns)),
             moves: before.iter().flat_map(|done| done.moves.clone()).chain(moves).collect(),
             sent: before
-                .filter(|done| !done.sent.is_empty())
-                .map_or(sent.clone(), |done| done.sent.start..sent.end.max(done.sent.end)),
+                .filter(|done| !done.sent_range.is_empty())
+                .map_or(sent.clone(), |done| done.sent_range.start..sent.end.max(done.sent_range.end)),
         });
     }
     writing.commit().with_activity("dating rows anew")?;

@@ -28,14 +28,14 @@ const FLUSH_LIMIT: Duration = Duration::from_secs(30);
 #[derive(Debug, Clone)]
 pub struct WriterLife {
     mailbox: Arc<Mailbox>,
-    shared: Arc<SharedStatus>,
+    status: Arc<SharedStatus>,
 }
 
 impl WriterLife {
     /// Is the thread there, and does the disk take what it writes?
     #[must_use]
     pub fn is_live(&self) -> bool {
-        !self.mailbox.is_stopped() && !self.shared.is_degraded()
+        !self.mailbox.is_stopped() && !self.status.is_degraded()
     }
 }
 
@@ -45,7 +45,7 @@ impl WriterLife {
 pub struct Writer {
     path: PathBuf,
     mailbox: Arc<Mailbox>,
-    shared: Arc<SharedStatus>,
+    status: Arc<SharedStatus>,
     thread: Option<JoinHandle<()>>,
     _lock: Lock,
 }
@@ -80,13 +80,13 @@ impl Writer {
             maintenance,
             db,
             mailbox: mailbox.clone(),
-            shared: shared.clone(),
+            status: shared.clone(),
             options,
             schedule: CommitSchedule::default(),
         };
         let thread =
             std::thread::Builder::new().name("history".to_owned()).spawn(|| thread.run()).map_err(add_path(path))?;
-        Ok(Self { path: path.to_owned(), mailbox, shared, thread: Some(thread), _lock: lock })
+        Ok(Self { path: path.to_owned(), mailbox, status: shared, thread: Some(thread), _lock: lock })
     }
 
     /// Hands in one tick: the channels of `sample`, and the values of the registered extras in their order. Takes well
@@ -105,13 +105,13 @@ impl Writer {
     /// Samples up to and including this time survive a power cut. `None` before the first commit.
     #[must_use]
     pub fn acknowledged_through_ns(&self) -> Option<TimeNs> {
-        self.shared.acknowledged_ns()
+        self.status.acknowledged_ns()
     }
 
     /// Records up to this ticket survive a power cut.
     #[must_use]
     pub fn acknowledged_record(&self) -> u64 {
-        self.shared.acknowledged_record.load(std::sync::atomic::Ordering::Acquire)
+        self.status.acknowledged_record.load(std::sync::atomic::Ordering::Acquire)
     }
 
     /// Returns when everything handed in so far is durable.
@@ -149,7 +149,7 @@ impl Writer {
         if self.thread.as_ref().is_none_or(JoinHandle::is_finished) {
             return Err(HistoryError::Stopped);
         }
-        let reason = self.shared.read_figures().degraded.unwrap_or_else(|| "the writer is still busy".to_owned());
+        let reason = self.status.read_figures().degraded.unwrap_or_else(|| "the writer is still busy".to_owned());
         Err(HistoryError::NotDurable { seconds: limit.as_secs_f64(), reason })
     }
 
@@ -162,20 +162,20 @@ impl Writer {
             queued_records: waiting.records,
             dropped_samples: waiting.dropped_samples,
             dropped_records: waiting.dropped_records,
-            ..self.shared.read_figures()
+            ..self.status.read_figures()
         }
     }
 
     /// Rounds of the thread. Whoever looks twice sees whether it moves.
     #[must_use]
     pub fn count_rounds(&self) -> u64 {
-        self.shared.rounds.load(std::sync::atomic::Ordering::Relaxed)
+        self.status.rounds.load(std::sync::atomic::Ordering::Relaxed)
     }
 
     /// Whether it takes what is handed in, at any later moment.
     #[must_use]
     pub fn life(&self) -> WriterLife {
-        WriterLife { mailbox: self.mailbox.clone(), shared: self.shared.clone() }
+        WriterLife { mailbox: self.mailbox.clone(), status: self.status.clone() }
     }
 
     /// Has the thread ended, which it does by itself only when it breaks off?

@@ -4,8 +4,10 @@
 use gateway_base::files::replace_durably;
 use gateway_config::Problem;
 use serde::Deserialize;
+use std::io;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
+use thiserror::Error;
 
 /// What `check --json` says, as far as it is needed here.
 #[derive(Debug, Deserialize)]
@@ -35,19 +37,29 @@ pub(super) fn check_text(path: &Path, text: &str) -> Vec<Problem> {
     }
 }
 
-fn run_check(beside: &Path) -> Result<Vec<Problem>, String> {
+/// Why the child gave no answer.
+#[derive(Debug, Error)]
+enum CheckBreak {
+    /// It could not be started, or not be waited for.
+    #[error(transparent)]
+    Start(#[from] io::Error),
+    /// It ended without an answer: its status, and the last line of its complaint.
+    #[error("{status} {complaint}")]
+    NoAnswer { status: ExitStatus, complaint: String },
+}
+
+fn run_check(beside: &Path) -> Result<Vec<Problem>, CheckBreak> {
     let running = PathBuf::from("/proc/self/exe");
     let program = if running.exists() { Ok(running) } else { std::env::current_exe() };
-    let output = Command::new(program.map_err(|error| error.to_string())?)
+    let output = Command::new(program?)
         .args(["check", "--json", "--limited", "--config"])
         .arg(beside)
         .stdin(Stdio::null())
-        .output()
-        .map_err(|error| error.to_string())?;
+        .output()?;
     let said = String::from_utf8_lossy(&output.stderr);
-    serde_json::from_slice::<CheckDocument>(&output.stdout)
-        .map(|document| document.problems)
-        .map_err(|_| format!("{} {}", output.status, said.lines().last().unwrap_or_default()))
+    serde_json::from_slice::<CheckDocument>(&output.stdout).map(|document| document.problems).map_err(|_| {
+        CheckBreak::NoAnswer { status: output.status, complaint: said.lines().last().unwrap_or_default().to_owned() }
+    })
 }
 
 fn rename_file(mut problem: Problem, beside: &Path, name: &str) -> Problem {

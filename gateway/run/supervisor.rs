@@ -77,7 +77,7 @@ pub struct Supervisor {
 /// What a look has found.
 #[derive(Debug)]
 pub struct Breakage {
-    /// To be told.
+    /// What the person at the box is to be told of it.
     pub notices: Vec<Notice>,
     /// Name of a thread that is not started again.
     pub gone: Option<String>,

@@ -42,7 +42,7 @@ pub(super) struct NatsSink {
     /// With which server the next connection is tried first.
     server: usize,
     /// Items of this life that were sent, in which epoch.
-    sent: (u64, SentNumbers),
+    sent_numbers: (u64, SentNumbers),
 }
 
 impl NatsSink {
@@ -53,7 +53,7 @@ impl NatsSink {
             outbox: outbox.clone(),
             connection: None,
             server: 0,
-            sent: Default::default(),
+            sent_numbers: Default::default(),
         }
     }
 
@@ -75,10 +75,10 @@ impl NatsSink {
     /// Notes that these are sent now; gives which of them were made since the history was opened and never sent.
     fn note_sending(&mut self, items: &[Item]) -> Vec<bool> {
         let epoch = self.outbox.epoch();
-        if self.sent.0 != epoch {
-            self.sent = (epoch, SentNumbers::default());
+        if self.sent_numbers.0 != epoch {
+            self.sent_numbers = (epoch, SentNumbers::default());
         }
-        let numbers = &mut self.sent.1;
+        let numbers = &mut self.sent_numbers.1;
         let note = |item: &Item| {
             let fresh = item.epoch == epoch && !numbers.contains(item.sequence);
             if item.epoch == epoch {

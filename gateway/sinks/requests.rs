@@ -31,7 +31,7 @@ pub struct Requests {
     /// What was issued before is refused: it may have been obeyed by the run before.
     began_ns: TimeNs,
     /// Marks of the requests that are young enough to come again.
-    seen: VecDeque<(TimeNs, String)>,
+    recent_ids: VecDeque<(TimeNs, String)>,
 }
 
 impl Requests {
@@ -44,7 +44,7 @@ impl Requests {
             orders,
             rate: RowRate::new(PER_S, AT_ONCE),
             began_ns: clock::now_ns(),
-            seen: VecDeque::new(),
+            recent_ids: VecDeque::new(),
         }
     }
 
@@ -91,11 +91,11 @@ impl Requests {
         }
         // The rate bounds how many there are.
         let gone_ns = now_ns.saturating_sub(AGE_MAX_S * SECOND_NS);
-        self.seen.retain(|(issued_ns, _)| *issued_ns >= gone_ns);
-        if self.seen.iter().any(|(_, known)| known == id) {
+        self.recent_ids.retain(|(issued_ns, _)| *issued_ns >= gone_ns);
+        if self.recent_ids.iter().any(|(_, known)| known == id) {
             return Err(RequestRefusal::Repeated { id: id.clone() });
         }
-        self.seen.push_back((issued_ns, id.clone()));
+        self.recent_ids.push_back((issued_ns, id.clone()));
         Ok(())
     }
 }
@@ -133,6 +133,6 @@ mod tests {
         let later_ns = after.began_ns + SECOND_NS;
         assert_eq!(after.check_fresh(&origin("a", now_ns), later_ns), Err(RequestRefusal::BeforeStart));
         assert_eq!(after.check_fresh(&origin("a", later_ns), later_ns), Ok(()));
-        assert!(after.seen.len() == 1 && requests.seen.len() == 3);
+        assert!(after.recent_ids.len() == 1 && requests.recent_ids.len() == 3);
     }
 }

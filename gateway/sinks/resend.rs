@@ -18,14 +18,14 @@ const TRIES_MAX: u32 = 30;
 /// Sends items that were made from the history, no faster than is allowed.
 pub struct Resender {
     sink: Box<dyn Sink>,
-    connected: bool,
+    has_connection: bool,
     /// From one item to the next, s.
     pace_s: f64,
     next: Option<Instant>,
     /// Items that the receiver has taken, and those that it will never take.
-    pub sent: u64,
+    pub sent_count: u64,
     /// Items that the receiver will never take.
-    pub refused: u64,
+    pub refused_count: u64,
 }
 
 impl Resender {
@@ -40,7 +40,14 @@ impl Resender {
             ),
             _ => return None,
         };
-        Some(Self { sink, connected: false, pace_s: 1.0 / rate_per_s, next: None, sent: 0, refused: 0 })
+        Some(Self {
+            sink,
+            has_connection: false,
+            pace_s: 1.0 / rate_per_s,
+            next: None,
+            sent_count: 0,
+            refused_count: 0,
+        })
     }
 
     /// Sends these and returns when the receiver has all that it takes. After a failure it is tried again.
@@ -69,17 +76,17 @@ impl Resender {
         while !rest.is_empty() {
             match self.try_sending(rest).await {
                 Ok(()) => {
-                    self.sent += rest.len() as u64;
+                    self.sent_count += rest.len() as u64;
                     return Ok(());
                 }
                 Err(SinkError::Item { sequence, .. }) => {
                     let index = rest.iter().position(|item| item.sequence == sequence).unwrap_or(0);
-                    self.sent += index as u64;
-                    self.refused += 1;
+                    self.sent_count += index as u64;
+                    self.refused_count += 1;
                     rest = &rest[index + 1..];
                 }
                 Err(error) => {
-                    self.connected = false;
+                    self.has_connection = false;
                     tries += 1;
                     if tries >= TRIES_MAX {
                         return Err(error);
@@ -93,14 +100,14 @@ impl Resender {
 
     async fn try_sending(&mut self, items: &[Item]) -> Result<(), SinkError> {
         let late = |_| SinkError::failed_line("the receiver does not answer in time", "look whether it is overloaded");
-        if !self.connected {
+        if !self.has_connection {
             timeout(DEADLINE, self.sink.connect()).await.map_err(late)??;
-            self.connected = true;
+            self.has_connection = true;
         }
         timeout(DEADLINE, self.sink.send_batch(Batch { items, historical: true })).await.map_err(late)?
     }
 
-    /// Says goodbye.
+    /// Takes leave of the receiver, which then does not wait for more; at most two seconds.
     pub async fn close(&mut self) {
         // The receiver finds out by itself where the farewell does not reach it.
         let _late = timeout(Duration::from_secs(2), self.sink.close()).await;

@@ -10,6 +10,7 @@ use physics::{Entry, Scene};
 
 /// Gauss-Newton steps at most, of a fit without bounds and of one with: what rests at a bound and leaves it again takes more.
 const STEPS_MAX: usize = 12;
+/// The same with bounds. Chosen by hand: too few end before a parameter has left its bound again, too many cost time.
 const BOUNDED_STEPS_MAX: usize = 40;
 /// Dampings (Marquardt, J. SIAM 11, 1963) of a bounded fit, as shares of each column's square, that are tried where no share
 /// of the whole step lowers the error: two lags that explain one delay have a valley that a plain step leaps across.
@@ -42,7 +43,7 @@ pub(super) struct Metric<'a> {
     /// From a column of every row to one number per row that takes part.
     pub(super) weigh: &'a dyn Fn(&[f64]) -> Vec<f64>,
     /// Must proportional parameters stay within what is physically possible? Shapes always do.
-    pub(super) bounded: bool,
+    pub(super) has_bounds: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -61,7 +62,7 @@ pub(super) struct Fit {
 pub(super) fn fit_parts(scene: &mut Scene, parts: &[Part], metric: &Metric<'_>) -> Option<Fit> {
     let free = list_free_parameters(parts);
     let mut parts = parts.to_vec();
-    if metric.bounded {
+    if metric.has_bounds {
         parts.iter_mut().for_each(clamp_to_range);
     }
     let mut simulated = simulate_parts(&parts, scene)?;
@@ -74,7 +75,7 @@ pub(super) fn fit_parts(scene: &mut Scene, parts: &[Part], metric: &Metric<'_>) 
     };
     let mut error = sum(&parts, &simulated.total);
     let (steps_max, dampings) =
-        if metric.bounded { (BOUNDED_STEPS_MAX, &DAMPINGS[..]) } else { (STEPS_MAX, &DAMPINGS[..1]) };
+        if metric.has_bounds { (BOUNDED_STEPS_MAX, &DAMPINGS[..]) } else { (STEPS_MAX, &DAMPINGS[..1]) };
     for _ in 0..steps_max {
         let tangents = compute_tangents(scene, &parts, &free, &simulated)?;
         let linear = Linearised::new(&parts, &free, metric, (&simulated.total, &tangents), ridge);
@@ -134,7 +135,7 @@ fn sum_prior_squares(parts: &[Part], free: &[Free]) -> f64 {
 struct Linearised<'a> {
     parts: &'a [Part],
     free: &'a [Free],
-    bounded: bool,
+    has_bounds: bool,
     left: Vec<f64>,
     columns: Vec<Vec<f64>>,
     sizes: Vec<f64>,
@@ -160,10 +161,10 @@ impl<'a> Linearised<'a> {
         }
         let sizes: Vec<f64> = columns.iter().map(|column| rms(&column[..rows]).max(f64::MIN_POSITIVE)).collect();
         for ((column, size), tangent) in columns.iter_mut().zip(&sizes).zip(tangents) {
-            let unseen = metric.bounded && *size < SEEN * rms(tangent);
+            let unseen = metric.has_bounds && *size < SEEN * rms(tangent);
             column.iter_mut().for_each(|x| *x = if unseen { 0.0 } else { *x / size });
         }
-        Self { parts, free, bounded: metric.bounded, left, columns, sizes }
+        Self { parts, free, has_bounds: metric.has_bounds, left, columns, sizes }
     }
 
     /// The step to the least error if everything were proportional, damped; parameters that stand at the end of their range and
@@ -195,7 +196,7 @@ impl<'a> Linearised<'a> {
     fn leaves_range(&self, index: usize, step: f64) -> bool {
         let parameter = &self.parts[self.free[index].part].parameters[self.free[index].parameter];
         let (low, high) = parameter.range;
-        let held = self.bounded || parameter.entry == Entry::Shape;
+        let held = self.has_bounds || parameter.entry == Entry::Shape;
         held && (parameter.value <= low && step < 0.0 || parameter.value >= high && step > 0.0)
     }
 }
@@ -227,7 +228,7 @@ fn search_step_length(
                 change = change.clamp(-most, most);
             }
             parameter.value += change;
-            if metric.bounded || parameter.entry == Entry::Shape {
+            if metric.has_bounds || parameter.entry == Entry::Shape {
                 parameter.value = parameter.value.clamp(low, high);
             }
         }
@@ -309,11 +310,11 @@ mod tests {
         Scene::new(&recording, "force_n", &Default::default()).expect("recorded")
     }
 
-    fn fitted(level_n: f64, bounded: bool) -> Fit {
+    fn fitted(level_n: f64, has_bounds: bool) -> Fit {
         let mut scene = scene(level_n);
         let recorded = scene.recorded_output().to_vec();
         let parts = parse_model(MODEL).expect("fine").parts;
-        let metric = Metric { recorded: &recorded, weigh: &|column| column.to_vec(), bounded };
+        let metric = Metric { recorded: &recorded, weigh: &|column| column.to_vec(), has_bounds };
         fit_parts(&mut scene, &parts, &metric).expect("every input is recorded")
     }
 
@@ -337,7 +338,7 @@ mod tests {
         let mut scene = scene(-20.0);
         let recorded = scene.recorded_output().to_vec();
         let outside = fitted(-20.0, false).parts;
-        let metric = Metric { recorded: &recorded, weigh: &|column| column.to_vec(), bounded: true };
+        let metric = Metric { recorded: &recorded, weigh: &|column| column.to_vec(), has_bounds: true };
         let held = fit_parts(&mut scene, &outside, &metric).expect("every input is recorded");
         assert_eq!(held.parts[1].find_parameter("level").expect("a level").value, 0.0);
     }

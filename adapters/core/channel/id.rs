@@ -15,13 +15,13 @@ impl ChannelId {
         CHANNELS.len() + declarations::count_declared()
     }
 
-    /// The channel of the table with this name, found while the program is compiled: `const MODE: ChannelId = ChannelId::named("mode");`. A
+    /// The channel of the table with this name, found while the program is compiled: `const MODE: ChannelId = ChannelId::find_constant("mode");`. A
     /// name that the table does not have does not compile there.
     ///
     /// # Panics
     /// There is none of this name; in a constant that is an error of the compiler.
     #[must_use]
-    pub const fn named(name: &str) -> Self {
+    pub const fn find_constant(name: &str) -> Self {
         let mut index = 0;
         while index < COUNT {
             if is_same_name(TABLE[index].name.as_bytes(), name.as_bytes()) {

@@ -1,8 +1,8 @@
 //! Which data item feeds which channel. The paths are those of Huazhong's default model.
 
 use super::decode::{self, ChannelWord};
+use super::item_conversion::ItemConversion;
 use super::lenient_json::parse_integer;
-use super::measured::ItemConversion;
 use super::message::{NcLinkAnswer, RequestedItem};
 use super::model::{Model, ModelItem};
 use super::own_path::OwnPath;

@@ -36,7 +36,7 @@ pub struct ItemMove {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct RedatedItems {
     /// Numbers of those that some sink had delivered before under their old date.
-    pub(crate) sent: Range<u64>,
+    pub(crate) sent_range: Range<u64>,
     /// What receivers have to know.
     pub(crate) moves: Vec<ItemMove>,
 }
@@ -68,7 +68,7 @@ pub(crate) fn redate_items(
         to_ns: before.as_ref().map(|before| before.end),
     };
     let moves = Epochs::load(db)?.divide(from, end).into_iter().map(in_time).collect();
-    Ok(RedatedItems { sent: from..sent_before(db)?.min(end).max(from), moves })
+    Ok(RedatedItems { sent_range: from..sent_before(db)?.min(end).max(from), moves })
 }
 
 fn move_waiting(db: &Connection, from: u64, to: Option<u64>, by_ns: i64) -> Result<(), HistoryError> {

@@ -99,7 +99,7 @@ pub enum UpdateError {
     /// The version is the one that an update would go back to.
     #[error("{slot} is the confirmed version of this box already, and an update goes back to it: it is not replaced")]
     InPlace {
-        /// Its slot.
+        /// Name of the slot that holds the version.
         slot: String,
     },
     /// Another update is under way.

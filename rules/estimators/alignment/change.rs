@@ -23,7 +23,7 @@ const STEP_S: f64 = 0.05;
 
 /// A transient whose lag is not the known one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Departure {
+struct LagDeparture {
     lag_s: f64,
     /// Off the known lag by so much, s.
     off_s: f64,
@@ -44,7 +44,7 @@ pub struct LagChange {
 /// Looks at every new transient while a lag is known.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LagWatch {
-    before: Option<Departure>,
+    before: Option<LagDeparture>,
 }
 
 impl LagWatch {
@@ -61,7 +61,7 @@ impl LagWatch {
             self.before = None;
             return None;
         };
-        let agrees = |before: &Departure| {
+        let agrees = |before: &LagDeparture| {
             (before.lag_s - found.lag_s).abs() <= AGREE_S.max(AGREE_SHARE * found.off_s.abs())
                 && before.off_s * found.off_s > 0.0
         };
@@ -78,7 +78,7 @@ fn is_telling(transient: &Transient, settings: &LagSettings) -> bool {
     range >= settings.change_min_rpm && range <= settings.rise_max_s * transient.steepest_rpm_s()
 }
 
-fn find_departure(transient: &Transient, known: &Lag, settings: &LagSettings) -> Option<Departure> {
+fn find_departure(transient: &Transient, known: &Lag, settings: &LagSettings) -> Option<LagDeparture> {
     let model = known.model.to_coefficients();
     let top_rpm = transient.range_rpm().1;
     let one = Ready::from_transient(transient, top_rpm, known.excess_tau_s, settings.lags_s, settings.window_max_s);
@@ -96,7 +96,7 @@ fn find_departure(transient: &Transient, known: &Lag, settings: &LagSettings) ->
     let noise = known.residual_w.powi(2) * count_to_f64(one.rows()) * 0.1;
     let is_better = residual(known_s) + noise > BETTER * (residual(lag_s) + noise);
     let departs = off_s.abs() > DEPARTS_S.max(known.uncertainty_s);
-    (departs && is_better).then_some(Departure { lag_s, off_s, middle_s: one.middle_s })
+    (departs && is_better).then_some(LagDeparture { lag_s, off_s, middle_s: one.middle_s })
 }
 
 impl PowerModel {

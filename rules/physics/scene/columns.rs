@@ -41,7 +41,7 @@ impl Scene {
                 }
                 Cells::Words(words) if !words.words().is_empty() => {
                     let filled = fill_short_gaps(words, &self.runs);
-                    self.filled.insert(column.name.clone(), filled.gaps);
+                    self.filled_rows.insert(column.name.clone(), filled.gaps);
                     complete.set_column(&column.name, Cells::Words(filled.words.clone()));
                     self.words.insert(column.name.clone(), filled.words);
                 }
@@ -83,7 +83,7 @@ impl Scene {
     fn keep_column(&mut self, name: &str, values: &[f64], told: &Numbers, is_defined: impl Fn(usize) -> bool) {
         let absent: Vec<bool> = (0..self.rows).map(|row| told.get(row).is_none()).collect();
         let filled = (0..self.rows).filter(|row| absent[*row] && is_defined(*row)).collect();
-        self.filled.insert(name.to_owned(), filled);
+        self.filled_rows.insert(name.to_owned(), filled);
         self.absent.insert(name.to_owned(), absent);
         self.columns.insert(name.to_owned(), values.to_vec());
     }

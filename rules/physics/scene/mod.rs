@@ -148,7 +148,7 @@ pub struct Scene {
     period_s: f64,
     columns: BTreeMap<String, Vec<f64>>,
     absent: BTreeMap<String, Vec<bool>>,
-    filled: BTreeMap<String, Vec<usize>>,
+    filled_rows: BTreeMap<String, Vec<usize>>,
     words: BTreeMap<String, Words>,
     roles: BTreeMap<Role, String>,
     output: String,
@@ -191,7 +191,7 @@ impl Scene {
             run_names,
             columns: BTreeMap::new(),
             absent: BTreeMap::new(),
-            filled: BTreeMap::new(),
+            filled_rows: BTreeMap::new(),
             words: BTreeMap::new(),
             roles: BTreeMap::new(),
             output: output.to_owned(),
@@ -328,7 +328,7 @@ impl Scene {
     /// The rows of a column, of numbers or of words, whose value is not recorded but filled in, or follows from one that is.
     #[must_use]
     pub fn filled_rows(&self, name: &str) -> &[usize] {
-        self.filled.get(name).map_or(&[], Vec::as_slice)
+        self.filled_rows.get(name).map_or(&[], Vec::as_slice)
     }
 
     /// A text column by its name.

@@ -14,7 +14,24 @@ use adapter_core::{Absence, ChannelId, Sample, Slot, Value};
 use estimators::loads::{Figure, LoadEstimator};
 use estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
 use rhai::{Dynamic, ImmutableString};
+use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// A word for `unknown_because` that a trial does not take.
+#[derive(Debug)]
+struct UnknownReason {
+    word: String,
+    /// Those that it takes.
+    words: [&'static str; 3],
+}
+
+impl std::error::Error for UnknownReason {}
+
+impl fmt::Display for UnknownReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "unknown_because = \"{}\": in a trial it is one of {}", self.word, self.words.join(", "))
+    }
+}
 
 /// When every trial begins.
 const BEGIN_NS: TimeNs = 1_800_000_000 * SECOND_NS;
@@ -101,7 +118,7 @@ impl TrialContext {
             return self.give_state(value);
         }
         if name == "unknown_because" {
-            return self.give_unknown_because(value);
+            return self.give_unknown_because(value).map_err(|refusal| refusal.to_string());
         }
         if let Some(id) = ChannelId::from_name(name) {
             return self.give_channel(id, value);
@@ -161,12 +178,11 @@ impl TrialContext {
     }
 
     /// Of the reasons with a number of their own the number is that of the channel; a trial needs none.
-    fn give_unknown_because(&mut self, value: &Dynamic) -> Result<(), String> {
+    fn give_unknown_because(&mut self, value: &Dynamic) -> Result<(), UnknownReason> {
         let word = value.clone().into_immutable_string().unwrap_or_default();
         let known = [NoEstimate::NotYet, NoEstimate::Contradiction, NoEstimate::ControlSilent { power_w: 0.0 }];
-        let words = known.map(NoEstimate::as_word);
         let found = known.into_iter().find(|reason| reason.as_word() == word.as_str());
-        let refused = || format!("unknown_because = \"{word}\": in a trial it is one of {}", words.join(", "));
+        let refused = || UnknownReason { word: word.to_string(), words: known.map(NoEstimate::as_word) };
         self.estimates.unknown_because = Some(found.ok_or_else(refused)?);
         Ok(())
     }

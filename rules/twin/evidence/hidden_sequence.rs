@@ -92,7 +92,7 @@ struct Chain<'a> {
 
 /// Two levels with what they are and how noisy.
 #[derive(Debug, Clone, Copy)]
-struct TwoLevels {
+struct ChainLevels {
     low: f64,
     step: f64,
     deviation: f64,
@@ -114,13 +114,13 @@ pub(super) fn find_hidden_sequence(
     let chain = Chain { inputs, innovations, memory };
     let deviation = inputs.compute_deviation(&x, false);
     let middle = median(inputs.fitted_rows(false).map(|row| x[row]).collect())?;
-    let mut best: Option<(f64, Vec<f64>, TwoLevels, usize)> = None;
+    let mut best: Option<(f64, Vec<f64>, ChainLevels, usize)> = None;
     for size in STEPS {
         for sign in [1.0, -1.0] {
             let step = sign * size * deviation;
             let low = if size > 1.5 { middle } else { middle - 0.5 * step };
             let spread = robust_deviation(inputs.fitted_rows(false).map(|row| chain.innovations[row]))? + 1e-12;
-            let fitted = chain.fit_chain(TwoLevels { low, step, deviation: spread, change: 0.01 });
+            let fitted = chain.fit_chain(ChainLevels { low, step, deviation: spread, change: 0.01 });
             if let Some(fitted) = fitted
                 && best.as_ref().is_none_or(|best| fitted.0 > best.0)
             {
@@ -139,7 +139,7 @@ pub(super) fn find_hidden_sequence(
 
 impl Chain<'_> {
     /// Log likelihoods of a row for (now, before) = (off, off), (off, on), (on, off), (on, on).
-    fn compute_ln_likelihoods(&self, row: usize, levels: TwoLevels) -> [f64; 4] {
+    fn compute_ln_likelihoods(&self, row: usize, levels: ChainLevels) -> [f64; 4] {
         let memory = self.memory[row];
         let z = self.innovations[row] - levels.low * (1.0 - memory);
         let of = |shift: f64| -0.5 * ((z - shift) / levels.deviation).clamp(-FARTHEST, FARTHEST).powi(2);
@@ -148,7 +148,7 @@ impl Chain<'_> {
     }
 
     /// Levels and the likeliest path, in turns.
-    fn fit_chain(&self, start: TwoLevels) -> Option<(f64, Vec<f64>, TwoLevels, usize)> {
+    fn fit_chain(&self, start: ChainLevels) -> Option<(f64, Vec<f64>, ChainLevels, usize)> {
         let mut levels = start;
         let mut on = Vec::new();
         let mut changes = 0;
@@ -176,7 +176,7 @@ impl Chain<'_> {
     }
 
     /// The likelihood of a row on a given path, four times.
-    fn compute_path_likelihoods(&self, row: usize, on: &[f64], levels: TwoLevels) -> [f64; 4] {
+    fn compute_path_likelihoods(&self, row: usize, on: &[f64], levels: ChainLevels) -> [f64; 4] {
         let before = row.checked_sub(1).is_some_and(|before| on[before] > 0.5);
         let all = self.compute_ln_likelihoods(row, levels);
         let own = all[2 * usize::from(on[row] > 0.5) + usize::from(before)];
@@ -194,7 +194,7 @@ impl Chain<'_> {
     }
 
     /// The likeliest path through the fitted rows (Viterbi).
-    fn decode_viterbi_path(&self, levels: TwoLevels) -> Vec<f64> {
+    fn decode_viterbi_path(&self, levels: ChainLevels) -> Vec<f64> {
         let (turn, stay) = (levels.change.ln(), (1.0 - levels.change).ln());
         let rows = self.inputs.rows;
         let mut from = vec![[0_u8, 1]; rows];
@@ -216,7 +216,7 @@ impl Chain<'_> {
     }
 
     /// Levels and noise by least squares along a path.
-    fn estimate_levels(&self, on: &[f64], old: TwoLevels) -> TwoLevels {
+    fn estimate_levels(&self, on: &[f64], old: ChainLevels) -> ChainLevels {
         let limit = 6.0 * old.deviation + old.step.abs();
         let (mut aa, mut ab, mut bb, mut ay, mut by) = (0.0, 0.0, 0.0, 0.0, 0.0);
         let of = |row: usize| {
@@ -239,11 +239,11 @@ impl Chain<'_> {
             self.innovations[row] - a * low - b * step
         });
         let deviation = robust_deviation(left).unwrap_or(old.deviation) + 1e-12;
-        TwoLevels { low, step, deviation, change: old.change }
+        ChainLevels { low, step, deviation, change: old.change }
     }
 
     /// Logarithm of the sum over all paths, less that of this path.
-    fn compute_path_evidence(&self, on: &[f64], levels: TwoLevels) -> f64 {
+    fn compute_path_evidence(&self, on: &[f64], levels: ChainLevels) -> f64 {
         let (stay, turn) = (1.0 - levels.change, levels.change);
         let (mut off_share, mut on_share) = (0.5, 0.5);
         let mut ln = 0.0;
@@ -262,7 +262,7 @@ impl Chain<'_> {
     }
 
     /// Held-out rows follow the state from earlier rows only.
-    fn filter_held_out_rows(&self, on: &mut [f64], levels: TwoLevels) {
+    fn filter_held_out_rows(&self, on: &mut [f64], levels: ChainLevels) {
         let fitted: Vec<f64> = self.inputs.fitted_rows(false).map(|row| on[row]).collect();
         let usual = numerics::statistics::mean(&fitted);
         let (stay, turn) = (1.0 - levels.change, levels.change);

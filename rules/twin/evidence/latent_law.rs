@@ -9,7 +9,8 @@ use physics::{Entry, Form, find_effect};
 
 /// The kind that has such a form.
 pub(super) const CONSUMER: &str = "auxiliary_switch";
-/// Longest memory of the noise from row to row, as in the search for hidden sequences.
+/// Longest memory of the noise from row to row, as in the search for hidden sequences: nearer to one the noise
+/// follows every level, lower makes switches of slow noise.
 const MEMORY_MAX: f64 = 0.95;
 
 /// Rows in which a contribution of two levels is on; `None` where it is none.

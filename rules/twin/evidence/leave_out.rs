@@ -13,7 +13,7 @@ use numerics::statistics::{count_to_f64, rms};
 const RIDGE: f64 = 1e-6;
 
 /// What is left of the fitted rows and what moves it, whitened.
-pub(super) struct LeftOut {
+pub(super) struct PartwiseLoss {
     left: Vec<f64>,
     columns: Vec<Vec<f64>>,
     /// Ridge of each column beside the common one.
@@ -23,10 +23,10 @@ pub(super) struct LeftOut {
 
 impl EvidenceReport<'_, '_> {
     /// A fit, prepared to be left out part by part.
-    pub(super) fn prepare_left_out(&self, fit: &Fit) -> LeftOut {
+    pub(super) fn prepare_left_out(&self, fit: &Fit) -> PartwiseLoss {
         let rest: Vec<f64> = self.recorded.iter().zip(&fit.simulated).map(|(y, f)| y - f).collect();
         let parts = split_into_parts(self.inputs, self.comparison);
-        let mut prepared = LeftOut { left: self.whiten(&rest), columns: Vec::new(), ridges: Vec::new(), parts };
+        let mut prepared = PartwiseLoss { left: self.whiten(&rest), columns: Vec::new(), ridges: Vec::new(), parts };
         for (tangent, free) in fit.tangents.iter().zip(&fit.free) {
             let deviation = fit.parts[free.part].parameters[free.parameter].prior_deviation();
             prepared.add_column(self.whiten(tangent), deviation);
@@ -35,7 +35,7 @@ impl EvidenceReport<'_, '_> {
     }
 }
 
-impl LeftOut {
+impl PartwiseLoss {
     /// Another column, whitened, with the usual deviation of its coefficient where it has one.
     pub(super) fn add_column(&mut self, column: Vec<f64>, deviation: Option<f64>) {
         let size = rms(&column) + 1e-30;

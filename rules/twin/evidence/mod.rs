@@ -93,7 +93,7 @@ pub fn diagnose_recording(recording: &Recording, model: &Model, seed: u64) -> Re
     let weigh = |column: &[f64]| -> Vec<f64> { fitted.iter().map(|row| column[*row]).collect() };
     let parts = case.parts.clone();
     let mut scene = case.scene.clone();
-    let metric = Metric { recorded: &recorded, weigh: &weigh, bounded: false };
+    let metric = Metric { recorded: &recorded, weigh: &weigh, has_bounds: false };
     let Some(baseline) = fit_parts(&mut scene, &parts, &metric) else {
         let needed = Bilingual::new("a model that can be fitted to this recording", "能对此记录拟合的模型");
         return Ok(build_undecided_diagnosis(&case, &needed));

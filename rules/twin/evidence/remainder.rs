@@ -8,22 +8,28 @@ use adapter_core::bilingual::Bilingual;
 use adapter_core::channel::quantity::Quantity;
 use numerics::statistics::{count_to_f64, mean, rms};
 
-/// Rows that a state of a switch must have, and share of all rows.
+/// Rows that a state of a switch must have: of fewer the size of what is left is too rough for [`STATE_RATIO`]. More cost silence
+/// about states that are rare.
 const STATE_ROWS_MIN: usize = 30;
+/// Share of all rows that it must have. Chosen by hand, not measured: lower tells of states that hardly occur, higher is silent about rare ones.
 const STATE_SHARE_MIN: f64 = 0.05;
 /// Ratio of what is left in one state and in the other from which both are told: of 30 independent rows each chance alone
 /// makes as much in one recording of three hundred.
 const STATE_RATIO: f64 = 1.7;
 /// Rows in a bin of a position, and bins at most: a screw of 5 mm over half a metre has a hundred turns.
 const BIN_ROWS_MIN: usize = 12;
+/// Bins at most, by the same screw: two to a turn and some to spare. Fewer cost sight of short waves, more cost rows in each.
 const BINS_MAX: usize = 240;
-/// Share of the squares of what is left that follows a position in runs that took no part, from which it is told.
+/// Share of the squares of what is left that follows a position in runs that took no part, from which it is told. Chosen by hand, not measured: lower
+/// tells of chance, higher is silent about a weak error of the screw.
 const POSITION_SHARE: f64 = 0.15;
-/// Windows in which the slow part is looked for, and rows in each at least.
+/// Windows in which the slow part is looked for. Chosen by hand, not measured: fewer miss what changes within a window, more take noise for it.
 const WINDOWS: usize = 24;
+/// Rows in each at least. Chosen by hand, not measured: of fewer the mean is too rough, more cost sight of a slow part in short recordings.
 const WINDOW_ROWS_MIN: usize = 20;
 /// The slow part is told from this share of the noise and of the output's size on: less is below what is told at all.
 const SLOW_NOISE: f64 = 0.5;
+/// The same share of the output's size. Chosen by hand, not measured: lower tells of what nobody would act on, higher is silent about drift.
 const SLOW_OUTPUT: f64 = 0.01;
 
 /// A figure, and its share of all that is left.

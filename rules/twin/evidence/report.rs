@@ -139,7 +139,7 @@ impl EvidenceReport<'_, '_> {
         let kept = (before - law) / (before - curve).max(f64::MIN_POSITIVE);
         let lawless = self.answer.names.iter().zip(&textbook.laws).filter(|(_, law)| law.is_none());
         let lawless: Vec<String> = lawless.map(|(name, _)| name.clone()).collect();
-        if kept < THRESHOLDS.kept {
+        if kept < THRESHOLDS.kept_share {
             let names = self.answer.names.clone();
             self.answer.add_unknown_rivals(&names);
         } else if !lawless.is_empty() {

@@ -75,7 +75,7 @@ impl EvidenceReport<'_, '_> {
 
     fn fit_in_noise_metric(&mut self, parts: &[Part]) -> Option<Fit> {
         let weigh = |column: &[f64]| self.comparison.whiten_column(column, self.noise);
-        fit_parts(&mut self.case.scene, parts, &Metric { recorded: self.recorded, weigh: &weigh, bounded: true })
+        fit_parts(&mut self.case.scene, parts, &Metric { recorded: self.recorded, weigh: &weigh, has_bounds: true })
     }
 
     /// Names that are taken back: their sizes are impossible.

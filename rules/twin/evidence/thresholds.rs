@@ -25,7 +25,7 @@
 //! | `unknown_share` | a third of the energy without a name is more than a form error of 15 % in three directions | higher: names beside unknown physics | unlisted beside listed effects |
 //! | `name_energy`, `size_noise`, `size_output` | below what a user would act on: a class 0.5 meter is wrong by as much | higher: lost small effects; lower: clutter | concealed pairs |
 //! | `textbook_share` | a law whose form is wrong by a third in size brings less | lower: a state passes for the law of a recorded column; higher: a known law without parameters | laws left out of the catalogue |
-//! | `kept` | the contract; of names that kept less 10 of 13 were right, of those that kept more 57 of 59 | lower: sure names of laws that are something else; higher: `unknown` beside right names whose law is stiff | written models of concealed cases |
+//! | `kept_share` | the contract; of names that kept less 10 of 13 were right, of those that kept more 57 of 59 | lower: sure names of laws that are something else; higher: `unknown` beside right names whose law is stiff | written models of concealed cases |
 //! | `looked_at`, `beside` | odds of 400 and 33 to 1 | higher: long lists of names; lower: the truth missing from a class | concealed classes |
 
 /// Every threshold of the decision; units and meaning beside each, source and cost in the table above.
@@ -76,7 +76,7 @@ pub(super) struct Thresholds {
     /// Share of what a curve brings that the law of a state must bring, so that it is that state.
     pub(super) textbook_share: f64,
     /// Share of what a curve gains in rows held out that the law must gain as it is written, so that its name stands alone.
-    pub(super) kept: f64,
+    pub(super) kept_share: f64,
     /// Nats behind the best within which a set is looked at.
     pub(super) looked_at: f64,
     /// Nats behind the best within which another name stands beside it.
@@ -107,7 +107,7 @@ pub(super) const THRESHOLDS: Thresholds = Thresholds {
     size_noise: 0.3,
     size_output: 0.005,
     textbook_share: 0.6,
-    kept: 0.8,
+    kept_share: 0.8,
     looked_at: 6.0,
     beside: 3.5,
 };

@@ -8,6 +8,7 @@ mod mtconnect;
 mod opendocument;
 mod parquet;
 mod shdr;
+mod sparse_sheet;
 mod tdms;
 mod tdms_channel;
 mod tdms_scaling;

@@ -16,27 +16,27 @@ struct SheetSize {
     /// Of the row that is being read: how often it stands, columns so far, columns up to the last one with a value.
     repeats: usize,
     place: usize,
-    filled: usize,
+    filled_width: usize,
 }
 
 impl SheetSize {
     fn begin_row(&mut self, row: &BytesStart<'_>) {
-        (self.repeats, self.place, self.filled) = (count_repeats(row, "table:number-rows-repeated"), 0, 0);
+        (self.repeats, self.place, self.filled_width) = (count_repeats(row, "table:number-rows-repeated"), 0, 0);
     }
 
     fn add_cell(&mut self, cell: &BytesStart<'_>) {
         self.place = self.place.saturating_add(count_repeats(cell, "table:number-columns-repeated"));
         if cell.attributes().with_checks(false).flatten().any(|attribute| attribute.key.as_ref() == "office:value-type")
         {
-            self.filled = self.place;
+            self.filled_width = self.place;
         }
     }
 
     fn end_row(&mut self) {
         self.rows = self.rows.saturating_add(self.repeats);
-        if self.filled > 0 {
+        if self.filled_width > 0 {
             self.filled_rows = self.rows;
-            self.columns = self.columns.max(self.filled);
+            self.columns = self.columns.max(self.filled_width);
         }
     }
 

@@ -24,21 +24,21 @@ pub enum UnitProblem {
 /// From the numbers of an item to those in a wanted unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ItemConversion<'a> {
-    wanted: &'a str,
-    found: Result<Conversion, UnitProblem>,
+    wanted_unit: &'a str,
+    conversion: Result<Conversion, UnitProblem>,
 }
 
 impl<'a> ItemConversion<'a> {
     /// `unit` is that of the item's numbers, where the model tells it; `wanted` is that of the channel.
     #[must_use]
     pub fn new(unit: Option<&str>, wanted: &'a str) -> Self {
-        Self { wanted, found: unit.map_or(Ok(Conversion::NONE), |unit| find_between(unit, wanted)) }
+        Self { wanted_unit: wanted, conversion: unit.map_or(Ok(Conversion::NONE), |unit| find_between(unit, wanted)) }
     }
 
     /// Why there is none.
     #[must_use]
     pub fn problem(&self) -> Option<UnitProblem> {
-        self.found.err()
+        self.conversion.err()
     }
 
     /// A number that was told without a unit of its own.
@@ -46,7 +46,7 @@ impl<'a> ItemConversion<'a> {
     /// # Errors
     /// [`Absence::UnknownUnit`].
     pub fn convert_number(&self, number: f64) -> Result<f64, Absence> {
-        self.found.map(|conversion| conversion.convert_number(number)).map_err(|_| Absence::UnknownUnit)
+        self.conversion.map(|conversion| conversion.convert_number(number)).map_err(|_| Absence::UnknownUnit)
     }
 
     /// What the device said, as a number in the wanted unit.
@@ -62,8 +62,8 @@ impl<'a> ItemConversion<'a> {
         }
         let (number, unit) = value.as_str().and_then(split_unit).ok_or(Absence::OutOfRange)?;
         // Where the model is at odds with the channel, nobody knows which of the three is meant.
-        self.found.map_err(|_| Absence::UnknownUnit)?;
-        find_between(unit, self.wanted)
+        self.conversion.map_err(|_| Absence::UnknownUnit)?;
+        find_between(unit, self.wanted_unit)
             .map(|conversion| conversion.convert_number(number))
             .map_err(|_| Absence::UnknownUnit)
     }
