@@ -7,6 +7,7 @@ use super::super::input::Input;
 use super::super::table::{ColumnCells, ColumnTable};
 use super::bytes::ByteReader;
 use super::tdms_channel::{RawIndex, TdmsChannel, TdmsValues, ValueKind, WaveformClock, read_moment, split_path};
+use super::tdms_scaling::TdmsScaling;
 use adapter_core::bilingual::Bilingual;
 use std::collections::HashMap;
 
