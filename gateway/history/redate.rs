@@ -75,15 +75,16 @@ pub fn set_clock(path: &Path, mark: &ClockMark, decided_ns: Option<TimeNs>) -> R
         let before = done.take();
         let (least, greatest) = before.as_ref().map_or((segment.by_ns, segment.by_ns), |done| done.by_ns);
         let numbers = (segment.marks.outbox, segment.next_marks.as_ref().map(|marks| marks.outbox));
-        let RedatedItems { sent, moves } = outbox::redate_items(&writing, numbers, &segment.rows, segment.by_ns)?;
+        let RedatedItems { sent_range: sent, moves } =
+            outbox::redate_items(&writing, numbers, &segment.rows, segment.by_ns)?;
         done = Some(Redated {
             segments: before.as_ref().map_or(0, |done| done.segments) + 1,
             samples: before.as_ref().map_or(0, |done| done.samples) + samples,
             by_ns: (least.min(segment.by_ns), greatest.max(segment.by_ns)),
             moves: before.iter().flat_map(|done| done.moves.clone()).chain(moves).collect(),
             sent: before
-                .filter(|done| !done.sent_range.is_empty())
-                .map_or(sent.clone(), |done| done.sent_range.start..sent.end.max(done.sent_range.end)),
+                .filter(|done| !done.sent.is_empty())
+                .map_or(sent.clone(), |done| done.sent.start..sent.end.max(done.sent.end)),
         });
     }
     writing.commit().with_activity("dating rows anew")?;

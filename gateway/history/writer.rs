@@ -80,7 +80,7 @@ impl Writer {
             maintenance,
             db,
             mailbox: mailbox.clone(),
-            status: shared.clone(),
+            shared: shared.clone(),
             options,
             schedule: CommitSchedule::default(),
         };
