@@ -60,7 +60,8 @@ impl FittedRows<'_> {
         let white: Vec<Vec<f64>> = fit.tangents.iter().map(|tangent| (self.whiten)(tangent)).collect();
         let freedom = innovations.len().saturating_sub(fit.free.len()).max(1);
         let variance = dot(&innovations, &innovations) / count_to_f64(freedom);
-        let inverse = least_squares(&white, &innovations).inverse;
+        let known = self.add_prior_rows(&white, variance);
+        let inverse = least_squares(&known, &vec![0.0; known.first().map_or(0, Vec::len)]).inverse;
         let among_units = compute_sandwich_variances(&white, &innovations, &inverse, &self.unit);
         let passed_on = self.compute_load_loss_factor(part);
         let of_part = fit.free.iter().enumerate().filter(|(_, free)| free.part == part);
@@ -68,7 +69,8 @@ impl FittedRows<'_> {
             .map(|(index, free)| {
                 let parameter = &fit.parts[part].parameters[free.parameter];
                 let between = match parameter.entry {
-                    Entry::Linear => {
+                    // Where the departure of the law was fitted, its levels differ in the model already.
+                    Entry::Linear if fit.parts[part].departures.is_empty() => {
                         let own: Vec<f64> = self.rows.iter().map(|row| fit.tangents[index][*row]).collect();
                         estimate_level_variance(
                             &project_out_others(&white, index),
@@ -77,7 +79,7 @@ impl FittedRows<'_> {
                             variance,
                         )
                     }
-                    Entry::Shape => 0.0,
+                    Entry::Linear | Entry::Shape => 0.0,
                 };
                 let told = ((inverse[index][index] * variance).max(among_units[index]) + between).max(0.0).sqrt();
                 let half = INTERVAL * told.hypot(LAW_SHARE * parameter.value / INTERVAL);
@@ -95,6 +97,18 @@ impl FittedRows<'_> {
                 }
             })
             .collect()
+    }
+
+    /// The columns with what is known beforehand as further rows, as in the fit: a departure is near zero.
+    fn add_prior_rows(&self, white: &[Vec<f64>], variance: f64) -> Vec<Vec<f64>> {
+        let mut columns = white.to_vec();
+        for (index, free) in self.fit.free.iter().enumerate() {
+            let parameter = &self.fit.parts[free.part].parameters[free.parameter];
+            let Some(deviation) = parameter.prior_deviation() else { continue };
+            let weight = variance.sqrt() / deviation;
+            columns.iter_mut().enumerate().for_each(|(other, c)| c.push(if other == index { weight } else { 0.0 }));
+        }
+        columns
     }
 
     /// What one unit more in the cut comes to at the output if the load loss that the model has acts on this part too; one

@@ -4,12 +4,12 @@
 use super::report::EvidenceReport;
 use crate::departure::is_of_departure;
 use crate::diagnosis::{Missing, ParameterEstimate};
-use crate::fit::Fit;
-use crate::model::{Part, simulate_parts};
+use crate::fit::{Fit, Free};
+use crate::model::{Parameter, simulate_parts};
 use physics::Entry;
 
-/// Rounds in which parameters are settled: each makes the intervals of the others narrower.
-const ROUNDS: usize = 3;
+/// Parameters of one fit that are settled, at most: a law of eight waves may keep one of them.
+const STEPS_MAX: usize = 12;
 /// Share by which the squares of rows left out may rise for a term that is left away: less than chance moves them.
 const NO_LOSS: f64 = 2e-3;
 
@@ -24,56 +24,83 @@ pub(super) fn is_determined(estimate: &ParameterEstimate) -> bool {
     excludes_zero(estimate) && width <= estimate.value.abs()
 }
 
+/// How many times half its interval a value is.
+fn compute_certainty(estimate: &ParameterEstimate) -> f64 {
+    let half = estimate.low.zip(estimate.high).map_or(f64::INFINITY, |(low, high)| 0.5 * (high - low));
+    estimate.value.abs() / half.max(f64::MIN_POSITIVE)
+}
+
+/// Does an interval reach an end of what is possible?
+fn reaches_end(estimate: &ParameterEstimate, parameter: &Parameter) -> bool {
+    let (low, high) = parameter.range;
+    estimate.low.is_some_and(|x| x <= low) || estimate.high.is_some_and(|x| x >= high)
+}
+
 impl EvidenceReport<'_, '_> {
     /// A fit in which shapes that the recording does not tell stay at the value they have, and terms that may be nothing are left
-    /// away where another term of the law holds.
+    /// away one by one where another term of the law remains: each makes the intervals of the others narrower.
     pub(super) fn settle_parameters(&mut self, fit: Fit) -> Fit {
         let mut best = fit;
-        for _ in 0..ROUNDS {
-            let Some(parts) = self.fix_undetermined(&best) else { break };
-            let Some(less) = self.refit_parts(&parts) else { break };
-            let (before, after) =
-                (self.prepare_left_out(&best).compute_square(), self.prepare_left_out(&less).compute_square());
-            if after > (1.0 + NO_LOSS) * before {
-                break;
+        let most = (1.0 + NO_LOSS) * self.prepare_left_out(&best).compute_square();
+        let mut kept: Vec<Free> = Vec::new();
+        for _ in 0..STEPS_MAX {
+            let Some((at, value)) = self.find_undetermined(&best, &kept) else { break };
+            let mut parts = best.parts.clone();
+            let parameter = &mut parts[at.part].parameters[at.parameter];
+            (parameter.value, parameter.fixed) = (value, true);
+            let less = self.refit_parts(&parts);
+            match less.filter(|less| self.prepare_left_out(less).compute_square() <= most) {
+                Some(less) => best = less,
+                None => kept.push(at),
             }
-            best = less;
         }
         let _ = simulate_parts(&best.parts, &mut self.case.scene);
         best
     }
 
-    /// The parts with what is not told of the laws fixed; `None` where everything is told.
-    fn fix_undetermined(&self, fit: &Fit) -> Option<Vec<Part>> {
-        let mut parts = fit.parts.clone();
-        let mut changed = false;
-        for place in self.baseline.parts.len()..parts.len() {
-            let told = self.estimate_parameters(fit, place);
-            let find = |name: &str| told.iter().find(|estimate| estimate.name == name);
-            let holds = |name: &str| find(name).is_some_and(excludes_zero);
-            let linear: Vec<String> = parts[place]
-                .parameters
-                .iter()
-                .filter(|parameter| parameter.entry == Entry::Linear)
-                .map(|parameter| parameter.name.clone())
-                .collect();
-            let any_holds = linear.iter().any(|name| holds(name));
-            let whole = parts[place].parameters.iter().any(|p| p.entry == Entry::Linear && p.fixed && p.value != 0.0);
-            for parameter in parts[place].parameters.iter_mut().filter(|p| !p.fixed && !is_of_departure(p)) {
-                let Some(estimate) = find(&parameter.name) else { continue };
-                let settled = match parameter.entry {
-                    Entry::Shape => !whole && !is_determined(estimate),
-                    Entry::Linear => any_holds && !excludes_zero(estimate),
-                };
-                if settled {
-                    if parameter.entry == Entry::Linear {
-                        parameter.value = 0.0_f64.clamp(parameter.range.0, parameter.range.1);
-                    }
-                    (parameter.fixed, changed) = (true, true);
-                }
-            }
+    /// The parameter of a law that the recording tells least, and the value it gets; `None` where everything is told.
+    fn find_undetermined(&self, fit: &Fit, kept: &[Free]) -> Option<(Free, f64)> {
+        let laws = self.baseline.parts.len()..fit.parts.len();
+        let told: Vec<Vec<ParameterEstimate>> =
+            laws.clone().map(|place| self.estimate_parameters(fit, place)).collect();
+        let free = || fit.free.iter().filter(|at| laws.contains(&at.part) && !kept.contains(at));
+        let parameter = |at: &Free| &fit.parts[at.part].parameters[at.parameter];
+        let is_of = |at: &Free, entry: Entry| parameter(at).entry == entry && !is_of_departure(parameter(at));
+        let find = |at: &Free| {
+            let own = told.get(at.part - laws.start)?;
+            own.iter().find(|estimate| estimate.name == parameter(at).name)
+        };
+        let is_whole = |at: &Free| {
+            fit.parts[at.part].parameters.iter().any(|p| p.entry == Entry::Linear && p.fixed && p.value != 0.0)
+        };
+        let open_shape = |at: &&Free| {
+            let open = |estimate: &ParameterEstimate| !is_determined(estimate) || reaches_end(estimate, parameter(at));
+            is_of(at, Entry::Shape) && !is_whole(at) && find(at).is_some_and(open)
+        };
+        if let Some(at) = free().find(open_shape) {
+            return Some((*at, parameter(at).value));
         }
-        changed.then_some(parts)
+        let count_sizes =
+            |part: usize| fit.free.iter().filter(|at| at.part == part && is_of(at, Entry::Linear)).count();
+        let may_be_nothing = |at: &&Free| {
+            let (low, high) = parameter(at).range;
+            is_of(at, Entry::Linear)
+                && (low..=high).contains(&0.0)
+                && count_sizes(at.part) > 1
+                && find(at).is_some_and(|estimate| !excludes_zero(estimate))
+        };
+        let certainty = |at: &Free| find(at).map_or(f64::INFINITY, compute_certainty);
+        if let Some(at) = free().filter(may_be_nothing).min_by(|a, b| certainty(a).total_cmp(&certainty(b))) {
+            return Some((*at, 0.0));
+        }
+        // A size per unit of a power of something is open as long as the power is: it holds for the power that is told.
+        let is_open = |at: &Free| is_of(at, Entry::Linear) && find(at).is_some_and(|estimate| !is_determined(estimate));
+        let shape = free().find(|shape| {
+            is_of(shape, Entry::Shape)
+                && !is_whole(shape)
+                && fit.free.iter().any(|at| at.part == shape.part && is_open(at))
+        })?;
+        Some((*shape, parameter(shape).value))
     }
 
     /// Names that are told as sure although the recording does not tell a size of theirs.
