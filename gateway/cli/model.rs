@@ -5,7 +5,7 @@ use super::lang::{language, localize_text, pick_text};
 use super::recording::read_typed_line;
 use super::{CannotRun, CommandOutcome, CommandResult, print_text};
 use crate::diagnosis::model_new::{KINDS, MATERIALS, ModelKind, NewModel};
-use crate::diagnosis::{read_model, read_recordings_as, simulation, unit_check, write_output};
+use crate::diagnosis::{Copies, read_model, read_recordings_as, simulation, unit_check, write_output};
 use clap::{Args, Subcommand};
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::find_output_unit;
@@ -122,7 +122,7 @@ fn ask_material() -> Option<String> {
 
 fn check_model(path: &Path, recordings: &[String], map: Option<&PathBuf>) -> CommandResult {
     let model = read_model(path).map_err(|wrong| super::diagnose::cannot_use(&wrong))?;
-    let given = read_recordings_as(recordings, map).map_err(|all| cannot_use_as(&all))?;
+    let given = read_recordings_as(recordings, map, Copies::CountOnce).map_err(|all| cannot_use_as(&all))?;
     given.warnings.iter().for_each(|warning| print_text(&format!("{}\n", localize_text(warning))));
     let examination = twin::examine_recording(&given.recording, &model);
     let (rows, runs) = (given.recording.count_rows(), given.recording.list_runs().len());
