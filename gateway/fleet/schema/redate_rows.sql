@@ -53,7 +53,7 @@ FROM (
              coalesce(to_jsonb(numbers[place]), to_jsonb(texts[place - cardinality(numbers)])) AS value,
              reasons[place - cardinality(numbers) - cardinality(texts)] AS reason
       FROM items AS sample CROSS JOIN LATERAL unnest(series) WITH ORDINALITY AS cell (series_id, place)
-      WHERE sample.box_id = moved.box_id AND kind = 'sample' AND at > (SELECT max(at) FROM items AS any_item WHERE any_item.box_id = moved.box_id) - interval '1 hour'
+      WHERE sample.box_id = moved.box_id AND kind = 'sample' AND at > (SELECT max(at) FROM items AS any_item WHERE any_item.box_id = moved.box_id AND any_item.kind = 'sample') - interval '1 hour'
       ORDER BY cell.series_id, at_ns DESC
     ) AS each) AS cells
   FROM (SELECT DISTINCT box_id FROM moving) AS moved JOIN items USING (box_id)
