@@ -143,6 +143,35 @@ pub(crate) fn mark_rows_since_run(scene: &Scene, run: &str) -> Option<Vec<f64>> 
     Some((0..scene.rows()).map(|row| if row >= start { 1.0 } else { 0.0 }).collect())
 }
 
+/// Squared deviations gained from which a level is taken to have begun.
+const BEGUN: f64 = 12.0;
+
+/// One from the last run of a stretch, `first to last`, on. In each earlier run of the stretch one in the rows whose earlier rows of
+/// the same run tell that `step` has begun, behind a noise of this deviation in the unit of the output; zero before the stretch.
+pub(crate) fn follow_step(scene: &Scene, stretch: &str, step: &[f64], deviation: f64) -> Option<Vec<f64>> {
+    let (first, last) = parse_run_stretch(scene, stretch)?;
+    let simulated = scene.simulated_output()?;
+    let start = scene.runs()[last].start;
+    let mut begun: Vec<f64> = (0..scene.rows()).map(|row| f64::from(u8::from(row >= start))).collect();
+    for run in &scene.runs()[first..last] {
+        let mut gained = 0.0;
+        for row in run.clone() {
+            begun[row] = f64::from(u8::from(gained > BEGUN));
+            if scene.usable_rows()[row] {
+                let left = scene.recorded_output()[row] - simulated[row];
+                gained += (left.powi(2) - (left - step[row]).powi(2)) / deviation.powi(2).max(f64::MIN_POSITIVE);
+            }
+        }
+    }
+    Some(begun)
+}
+
+/// A stretch of runs as [`follow_step`] reads it.
+#[must_use]
+pub fn format_run_stretch(first: &str, last: &str) -> String {
+    format!("{first}{RUN_TO_RUN}{last}")
+}
+
 /// One in the rows of a stretch of runs, `first to last`, zero elsewhere; `None` when there are no such runs.
 pub(crate) fn mark_rows_within_runs(scene: &Scene, stretch: &str) -> Option<Vec<f64>> {
     let (first, last) = parse_run_stretch(scene, stretch)?;

@@ -2,7 +2,7 @@
 
 use crate::cut::{estimate_cut_load, multiply_cut};
 use crate::excitation::{
-    compute_ln_count, find_run, mark_rows_since_run, build_step_forms, mark_word_rows, mark_rows_within_runs, build_word_forms,
+    compute_ln_count, find_run, follow_step, mark_rows_since_run, build_step_forms, mark_word_rows, mark_rows_within_runs, build_word_forms,
 };
 use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
@@ -13,7 +13,7 @@ pub struct HardnessBatch;
 static DOC: EffectDoc = EffectDoc {
     kind: "hardness_batch",
     family: "cutting",
-    law: "y = gain * L in one lot, or from one run on, or in a stretch of runs; lots: y = gain_i * L in lot i against the first",
+    law: "y = gain * L in one lot, or from one run on, or in a stretch of runs; followed: from some run of a stretch on, as the earlier rows of each run tell; lots: y = gain_i * L in lot i against the first",
     parameters: &[
         ParameterDoc::new_linear("gain", "1", (-0.4, 0.4), "share by which the cut is heavier", "切削负载增加的比例"),
         ParameterDoc::new_linear(
@@ -58,6 +58,14 @@ static DOC: EffectDoc = EffectDoc {
             "the same for lot 7 against the first lot",
             "第7批相对第一批的比例",
         ),
+        ParameterDoc::new_shape("height", "1", (-0.4, 0.4), "the gain that is looked for in runs that may be of either lot", "在批次未知的运行中查找的比例"),
+        ParameterDoc::new_shape(
+            "deviation",
+            "output",
+            (0.0, f64::INFINITY),
+            "noise behind which it is looked for",
+            "识别批次时的噪声",
+        ),
     ],
     needs: &["load | engaged", "lot | run"],
     source: "kc (1 + h) per lot, h 3-12 % either way",
@@ -90,7 +98,7 @@ impl Effect for HardnessBatch {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &["lot", "lots", "step", "stretch", "stretches"]
+        &["lot", "lots", "step", "stretch", "stretches", FOLLOWED]
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
@@ -113,6 +121,11 @@ impl Effect for HardnessBatch {
         if form.name == "stretches" {
             return compute_inferred_lots(scene, word);
         }
+        if form.name == FOLLOWED {
+            let (height, deviation) = (form.shape_value("height")?, form.shape_value("deviation")?);
+            let begun = follow_step(scene, word, &multiply_cut(scene, |_| height)?, deviation)?;
+            return Some(vec![("gain", multiply_cut(scene, |row| begun[row])?)]);
+        }
         let here = match column.as_str() {
             "run" => mark_rows_since_run(scene, word).or_else(|| mark_rows_within_runs(scene, word)),
             _ => mark_word_rows(scene, column, word),
@@ -123,7 +136,14 @@ impl Effect for HardnessBatch {
     fn has_hidden_state(&self) -> bool {
         true
     }
+
+    fn is_followed(&self, form: &Form) -> bool {
+        form.name == FOLLOWED
+    }
 }
+
+/// The form of a lot of which only a stretch of runs is known in which it begins.
+pub const FOLLOWED: &str = "followed";
 
 /// Names of the gains of the second and further lots.
 const GAINS: [&str; 6] = ["gain_2", "gain_3", "gain_4", "gain_5", "gain_6", "gain_7"];

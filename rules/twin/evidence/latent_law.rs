@@ -2,10 +2,12 @@
 //! simulation follows it from the earlier rows of a run.
 
 use super::inputs::RecordingInputs;
+use crate::departure::is_of_departure;
 use crate::model::{Parameter, Part};
 use numerics::statistics::{count_to_f64, robust_deviation};
 use physics::catalogue::auxiliary_switch::LATENT;
-use physics::{Entry, Form, find_effect};
+use physics::catalogue::hardness_batch::FOLLOWED;
+use physics::{Entry, Form, find_effect, format_run_stretch};
 
 /// The kind that has such a form.
 pub(super) const CONSUMER: &str = "auxiliary_switch";
@@ -60,6 +62,29 @@ pub(super) fn write_latent_part(inputs: &RecordingInputs<'_>, part: &Part, on: &
     let mut part = Part::from_effect(effect, &form, &["share"]);
     part.parameters.iter_mut().filter(|p| p.entry == Entry::Shape).for_each(clamp_into_range);
     Some(part)
+}
+
+/// A lot that begins with a fitted run, as it stands in a file: where the runs before it took no part in the fit it may have begun
+/// there, and their own earlier rows tell. `None` of every other part.
+pub(super) fn write_followed_step(inputs: &RecordingInputs<'_>, part: &Part, deviation: f64) -> Option<Part> {
+    let (effect, form) =
+        part.effect_and_form().filter(|(_, form)| part.kind == "hardness_batch" && form.name == "step")?;
+    let (column, run) = form.place?;
+    let (runs, names) = (inputs.scene.runs(), inputs.scene.run_names());
+    let is_fitted = |run: &usize| runs[*run].clone().any(|row| inputs.fitted[row]);
+    let told = names.iter().position(|name| *name == run)?;
+    // Rows held out do not say when it begins: the fitted runs around them do.
+    let last = (told..runs.len()).find(is_fitted)?;
+    let first = (0..last).rev().take_while(|run| !is_fitted(run)).last()?;
+    let gain = part.find_parameter("gain")?;
+    let place = Some((column, format_run_stretch(names.get(first)?, names.get(last)?)));
+    let shape = [("height", gain.value), ("deviation", deviation)];
+    let form = Form { name: FOLLOWED, place, ..Form::from_shape(&shape) };
+    let mut followed = Part::from_effect(effect, &form, &["gain"]);
+    followed.parameters.iter_mut().filter(|p| p.name == "gain").for_each(|p| p.clone_from(gain));
+    followed.parameters.extend(part.parameters.iter().filter(|p| is_of_departure(p)).cloned());
+    followed.departures.clone_from(&part.departures);
+    Some(followed)
 }
 
 fn clamp_into_range(parameter: &mut Parameter) {

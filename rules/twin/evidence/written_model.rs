@@ -1,7 +1,7 @@
 //! The model as it stands in a file, and the figures of each name that it tells.
 
 use super::answer::Named;
-use super::latent_law::{is_latent, write_latent_part};
+use super::latent_law::{is_latent, write_followed_step, write_latent_part};
 use super::report::EvidenceReport;
 use super::textbook::Textbook;
 use crate::fit::Fit;
@@ -34,7 +34,7 @@ impl EvidenceReport<'_, '_> {
         let left: Vec<f64> = self.recorded.iter().zip(&fit.simulated).map(|(y, f)| y - f).collect();
         let write = |part: &Part| match self.case.scene.unrecorded_state().filter(|_| is_latent(part)) {
             Some(on) => write_latent_part(self.inputs, part, on, &left),
-            None => Some(part.clone()),
+            None => write_followed_step(self.inputs, part, self.ordinary).or_else(|| Some(part.clone())),
         };
         let parts: Vec<Part> = fit.parts.iter().map(write).collect::<Option<_>>()?;
         let rows = simulate_written_parts(self.recording, self.case.model, &parts)?;
