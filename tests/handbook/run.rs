@@ -28,10 +28,9 @@ const ORDER: [&str; 10] = [
 const OTHER_CODES: [(&str, i32, &str); 1] =
     [("commission --config", 1, "parts of the commissioning are still missing, which the code tells")];
 /// Commands that are not run here, and where they are.
-const ELSEWHERE: [(&str, &str); 7] = [
+const ELSEWHERE: [(&str, &str); 6] = [
     ("fleet stream", "tests/records/fleet: needs a NATS server"),
     ("fleet ingest", "tests/records/fleet: needs NATS and PostgreSQL"),
-    ("fleet resend", "tests/records/fleet: needs a NATS server and a history"),
     ("fleet retain", "tests/records/fleet: needs PostgreSQL"),
     ("setup", "tests/box/whole: writes where a service is configured"),
     ("update", "tests/box/whole: needs the folders of the package"),

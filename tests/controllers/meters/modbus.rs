@@ -18,13 +18,16 @@ const SDM630: [Cell; 10] = [
     (0x10, "f", -434.5),
     (0x34, "f", -1234.5),
 ];
-const IEM3000: [Cell; 7] = [
+const IEM3000: [Cell; 10] = [
     (0x0BB7, "f", 3.0),
     (0x0BB9, "f", 4.0),
     (0x0BBB, "f", 5.0),
     (0x0BD3, "f", 229.0),
     (0x0BD5, "f", 230.0),
     (0x0BD7, "f", 231.0),
+    (0x0BED, "f", -0.4),
+    (0x0BEF, "f", -0.4),
+    (0x0BF1, "f", -0.4345),
     (0x0BF3, "f", -1.2345),
 ];
 const ADL400: [Cell; 9] = [
@@ -38,17 +41,20 @@ const ADL400: [Cell; 9] = [
     (0x0816, "f", -0.4),
     (0x0818, "f", -0.4345),
 ];
-const PAC: [Cell; 7] = [
+const PAC: [Cell; 10] = [
     (1, "f", 229.0),
     (3, "f", 230.0),
     (5, "f", 231.0),
     (13, "f", 3.0),
     (15, "f", 4.0),
     (17, "f", 5.0),
+    (25, "f", -400.0),
+    (27, "f", -400.0),
+    (29, "f", -434.5),
     (65, "f", -1234.5),
 ];
-/// Counts of the native scaling: 0.025 V, 0.5 mA, 0.375 W; the highest bit of power is its sign.
-const EDA9033A: [Cell; 7] = [
+/// Counts of the native scaling: 0.025 V, 0.5 mA, 0.375 W and 0.125 W of a phase; the highest bit of power is its sign.
+const EDA9033A: [Cell; 10] = [
     (0, "H", 9160.0),
     (1, "H", 6000.0),
     (2, "H", 9200.0),
@@ -56,6 +62,9 @@ const EDA9033A: [Cell; 7] = [
     (4, "H", 9240.0),
     (5, "H", 10000.0),
     (6, "H", 36060.0),
+    (9, "H", 36060.0),
+    (10, "H", 36060.0),
+    (11, "H", 36060.0),
 ];
 
 /// Voltage between phases of 229, 230 and 231 V against neutral.

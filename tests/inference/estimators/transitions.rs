@@ -56,7 +56,7 @@ fn a_silent_controller_makes_it_unknown_and_a_machine_that_is_off_makes_it_off()
     let silent = Now { speed_rpm: None, feed_mm_min: None, ..idle() };
     assert_eq!(bed.hold(silent, 3.0).0, [State::Idle, State::Unknown]);
     bed.reason = Absence::MachineOff;
-    assert_eq!(bed.hold(silent, 1.0).0, [State::Standby], "the meter still sees power");
+    assert_eq!(bed.hold(silent, 1.0).0, [State::Unknown], "the meter still sees power");
     assert_eq!(bed.hold(Now { total_w: Some(0.2), ..silent }, 1.0).0, [State::Off]);
     assert_eq!(bed.hold(Now { total_w: None, ..silent }, 1.0).0, [State::Off]);
 }

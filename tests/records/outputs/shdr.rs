@@ -78,7 +78,7 @@ fn an_agent_that_sends_nonsense_or_reads_nothing_harms_nobody() {
     asking.set_read_timeout(Some(Duration::from_secs(5))).expect("a limit");
     asking.write_all(b"* PING\r\n").expect("taken");
     let (mut heard, mut buffer) = (String::new(), [0; 4096]);
-    while !heard.contains("* PONG 10000\n") {
+    while !(heard.contains("* PONG 10000\n") && heard.contains("|avail|AVAILABLE")) {
         let count = asking.read(&mut buffer).expect("in time");
         assert!(count > 0, "closed after {heard}");
         heard += &String::from_utf8_lossy(&buffer[..count]);
