@@ -33,8 +33,9 @@ pub(super) fn origin_of(payload: &[u8]) -> RequestOrigin {
     let fields: Json = serde_json::from_slice(payload).unwrap_or_default();
     let word = |name: &str| fields.get(name).and_then(Json::as_str);
     // A time that is relative to now is none that somebody has noted.
-    let issued_ns =
-        word("issued_at").filter(|text| !text.starts_with('-')).and_then(|text| moment::parse(text, 0).ok());
+    let issued_ns = word("issued_at")
+        .filter(|text| text.starts_with(|first: char| first.is_ascii_digit()))
+        .and_then(|text| moment::parse(text, 0).ok());
     RequestOrigin::from_words(word("id"), word("from"), issued_ns)
 }
 

@@ -14,7 +14,7 @@ static DOC: EffectDoc = EffectDoc {
     family: "auxiliary",
     law: "P = level while the consumer runs; latent: P = step * chance that it runs, from the earlier rows of the run",
     parameters: &[
-        ParameterDoc::new_linear("level", "output", (0.0, f64::INFINITY), "power of the consumer", "该用电设备的功率"),
+        ParameterDoc::new_linear("level", "output", (0.0, 1e9), "power of the consumer", "该用电设备的功率"),
         ParameterDoc::new_linear(
             "share",
             "1",
@@ -25,14 +25,14 @@ static DOC: EffectDoc = EffectDoc {
         ParameterDoc::new_shape(
             "step",
             "output",
-            (0.0, f64::INFINITY),
+            (0.0, 1e9),
             "power of a consumer that nobody records",
             "未被记录的用电设备的功率",
         ),
         ParameterDoc::new_shape(
             "deviation",
             "output",
-            (0.0, f64::INFINITY),
+            (0.0, 1e9),
             "noise behind which it is looked for",
             "识别该设备时的噪声",
         ),

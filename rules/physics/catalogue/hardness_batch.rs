@@ -62,7 +62,7 @@ static DOC: EffectDoc = EffectDoc {
         ParameterDoc::new_shape(
             "deviation",
             "output",
-            (0.0, f64::INFINITY),
+            (0.0, 1e9),
             "noise behind which it is looked for",
             "识别批次时的噪声",
         ),

@@ -85,7 +85,9 @@ fn breaks_and_disarms(thread: &str) -> Duration {
         (gate(&armed.address)["armed_by"].is_null() && is_told(&armed.address, thread)).then(|| broke_off.elapsed())
     });
     assert!(took < WITHIN, "{thread}: {took:?}");
-    assert_eq!(crash_reports(&armed.path("data")), 1, "{thread}");
+    wait_for(&format!("{thread}: a crash report"), Duration::from_secs(10), || {
+        (crash_reports(&armed.path("data")) == 1).then_some(())
+    });
     if thread == "history" {
         let status = get(&armed.address, "/api/v1/status").json();
         assert!(status["history"]["error"].as_str().is_some_and(|error| error.contains("broke off")), "{status}");

@@ -51,8 +51,8 @@ fn the_box_runs_a_thermal_law_that_readings_correct() {
     let elsewhere = configuration("Mill 4").replace("\"data\"", "\"other\"");
     std::fs::write(directory.path().join("box.toml"), elsewhere).expect("written");
     // The law of another machine stops nothing but itself.
-    let (_, other) = person.runs(&["run", "--config", "box.toml", "--speed", "max"], 0);
-    assert!(other.contains("was identified for machine \"Mill 3\""), "{other}");
+    let (said, other) = person.runs(&["run", "--config", "box.toml", "--speed", "max"], 0);
+    assert!(format!("{said}{other}").contains("was identified for machine \"Mill 3\""), "{said}{other}");
     std::fs::write(directory.path().join("box.toml"), configuration("Mill 3")).expect("written");
     person.runs(&["check", "--config", "box.toml"], 0);
     person.runs(&["run", "--config", "box.toml", "--speed", "max"], 0);
