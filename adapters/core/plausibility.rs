@@ -80,7 +80,7 @@ impl Plausibility {
 fn describe_cut_text((id, bytes): (&ChannelId, &usize)) -> SourceProblem {
     SourceProblem {
         what: format!("{id} has a text of {bytes} bytes; only the first {TEXT_BYTES_MAX} are kept"),
-        next: "Look at what sends it: no control has a text of this length; a broker may let strangers publish"
+        next: "Look at what sends it: names, messages and blocks are shorter; at a broker somebody else may publish in its place"
             .to_owned(),
     }
 }

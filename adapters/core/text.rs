@@ -109,8 +109,8 @@ fn mark_bytes(bytes: &[u8]) -> String {
     text
 }
 
-/// Longest text of a channel, of a fact or of an error, bytes. The longest that a control has for a name, a message or a block is 256
-/// characters; a Chinese one takes three bytes. What a shorter limit would cost is the end of a real message, what a longer one costs
+/// Longest text of a channel, of a fact or of an error, bytes: 256 characters of three bytes, as a Chinese one takes. Chosen by hand: no
+/// longer name, message or block of a control has been seen. What a shorter limit would cost is the end of a real message, what a longer one costs
 /// is room in every row of the history.
 pub const TEXT_BYTES_MAX: usize = 768;
 

@@ -105,8 +105,7 @@ impl Reader {
     /// The power of the machine, W.
     fn read_power(&mut self, line: &mut Image, clock: &dyn Clock) -> Result<f64, Absence> {
         self.poll.read(line, clock, 1).map_err(|_| Absence::Refused)?;
-        let mut doubts = self.check.judge_values(&outputs::collect_supply_values(&self.registers, &self.poll));
-        outputs::doubt_missing_witnesses(&self.profile, &self.poll, &mut doubts);
+        let doubts = outputs::judge_answer(&mut self.check, &self.profile, &self.registers, &self.poll);
         let power = self.outputs.iter().find(|output| output.channel.name() == "total_power_w");
         let reading = power.ok_or(Absence::NotProvided)?.build_reading(&self.registers, &self.poll, &doubts);
         reading.value.map(|value| value.as_number().unwrap_or(f64::NAN))

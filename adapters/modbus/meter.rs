@@ -136,9 +136,7 @@ impl ModbusMeter {
             ModbusError::Timeout { .. } => format!("{request}: no answer"),
             ModbusError::Line { what, .. } | ModbusError::Garbled(what) => what,
         })?;
-        let mut doubts =
-            SupplyCheck::default().judge_values(&outputs::collect_supply_values(&profile.registers, &poll));
-        outputs::doubt_missing_witnesses(&profile, &poll, &mut doubts);
+        let doubts = outputs::judge_answer(&mut SupplyCheck::default(), &profile, &profile.registers, &poll);
         if let Some(problem) = doubts.problems.first() {
             return Err(problem.what.clone());
         }
@@ -197,8 +195,7 @@ impl Source for ModbusMeter {
         }
         let (all, stamp) = self.poll.list_all_registers();
         self.refresh.push(all, stamp.mid_ns);
-        self.doubts = self.check.judge_values(&outputs::collect_supply_values(&self.registers, &self.poll));
-        outputs::doubt_missing_witnesses(&self.profile, &self.poll, &mut self.doubts);
+        self.doubts = outputs::judge_answer(&mut self.check, &self.profile, &self.registers, &self.poll);
         out.extend(self.outputs.iter().map(|output| output.build_reading(&self.registers, &self.poll, &self.doubts)));
         out.extend(self.own.iter().map(|(own, places)| self.own_reading(own, places)));
         Ok(())

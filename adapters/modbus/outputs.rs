@@ -8,7 +8,7 @@ use crate::address::MeterTarget;
 use adapter_core::address::Circuit;
 use adapter_core::channel::ChannelId;
 use adapter_core::driver::SourceProblem;
-use adapter_core::electric::{Doubts, SupplyValues};
+use adapter_core::electric::{Doubts, SupplyCheck, SupplyValues};
 use adapter_core::integer::count_to_f64;
 use adapter_core::reading::Reading;
 
@@ -169,8 +169,20 @@ pub(super) fn list_channels(profile: &Profile, circuit: Circuit) -> Result<Vec<M
     if outputs.is_empty() { Err(MeterError::NoChannel { profile: profile.name.clone() }) } else { Ok(outputs) }
 }
 
+/// What of the last answer is not believed.
+pub(super) fn judge_answer(
+    check: &mut SupplyCheck,
+    profile: &Profile,
+    registers: &[MeterRegister],
+    poll: &RegisterPoll,
+) -> Doubts {
+    let mut doubts = check.judge_values(&collect_supply_values(registers, poll));
+    doubt_missing_witnesses(profile, poll, &mut doubts);
+    doubts
+}
+
 /// A map that nobody has confirmed is believed only with all of its witnesses: a meter that refuses one of them may be another one.
-pub(super) fn doubt_missing_witnesses(profile: &Profile, poll: &RegisterPoll, doubts: &mut Doubts) {
+fn doubt_missing_witnesses(profile: &Profile, poll: &RegisterPoll, doubts: &mut Doubts) {
     let is_electric = |meaning| !matches!(meaning, RegisterMeaning::Channel(_) | RegisterMeaning::Energy);
     let mut electric = profile.registers.iter().filter(|register| is_electric(register.meaning));
     let Some(missing) = electric.find(|register| !poll.has_register(register)).filter(|_| !profile.confirmed) else {
@@ -188,7 +200,7 @@ pub(super) fn doubt_missing_witnesses(profile: &Profile, poll: &RegisterPoll, do
 }
 
 /// What the last poll says of the supply.
-pub(super) fn collect_supply_values(registers: &[MeterRegister], poll: &RegisterPoll) -> SupplyValues {
+fn collect_supply_values(registers: &[MeterRegister], poll: &RegisterPoll) -> SupplyValues {
     let mut values = SupplyValues::default();
     for register in registers {
         let number = poll.find_number(register).ok().map(|(number, _)| number);

@@ -56,6 +56,9 @@ impl Link {
     }
 }
 
+/// What a device sends by itself.
+const UNASKED: [Subject; 4] = [Subject::Sample, Subject::Event, Subject::Register, Subject::Version];
+
 /// A message that nobody asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unasked {
@@ -91,8 +94,7 @@ impl Connection {
         let fault = |error| broker_fault(link, error);
         let client = MqttClient::connect(&options).map_err(fault)?;
         let answers = [Subject::ProbeAnswer, Subject::QueryAnswer, Subject::SetAnswer];
-        let more: &[Subject] =
-            if samples { &[Subject::Sample, Subject::Event, Subject::Register, Subject::Version] } else { &[] };
+        let more: &[Subject] = if samples { &UNASKED } else { &[] };
         let filters: Vec<String> =
             answers.iter().chain(more).map(|subject| subject.build_filter(&link.serial)).collect();
         client.subscribe_filters(&filters, Qos::AtMostOnce).map_err(fault)?;
@@ -209,7 +211,7 @@ impl Connection {
 
     fn keep_unasked(&mut self, message: &MqttMessage) {
         let Some((subject, tail)) = Subject::from_topic(&message.topic, &self.link.serial) else { return };
-        if !matches!(subject, Subject::Sample | Subject::Event | Subject::Register | Subject::Version) {
+        if !UNASKED.contains(&subject) {
             return;
         }
         match self.link.encoding.parse_json(&message.payload) {

@@ -156,20 +156,20 @@ impl ItemColumn {
             && parse_number(value).is_none()
         {
             match split_unit(text) {
-                Some((_, unit)) if self.values.iter().all(Option::is_none) && self.unit.is_none() => {
+                Some((_, unit)) if self.unit.is_none() && self.values.iter().all(Option::is_none) => {
                     self.unit = Some(unit.to_owned());
                 }
                 Some(_) => {}
                 None => self.word = Some(text.clone()),
             }
         }
-        let unit = self.unit.as_deref();
-        // Without a unit a number stands for itself, and a text with one for none.
-        let number = match unit {
-            Some(unit) => ItemConversion::new(Some(unit), unit).convert_value(value).ok(),
-            None => parse_number(value),
+        // Only a text brings a unit of its own.
+        let in_own_unit = || {
+            let unit = self.unit.as_deref()?;
+            ItemConversion::new(Some(unit), unit).convert_value(value).ok()
         };
-        self.values.push(number.or_else(|| parse_number(value)));
+        let number = parse_number(value).or_else(in_own_unit);
+        self.values.push(number);
     }
 }
 

@@ -105,6 +105,13 @@ impl SampleTracks {
         self.why_stands = true;
     }
 
+    /// A message that is dropped, and no fault of the device.
+    pub(super) fn record_dropped(&mut self, why: &str) {
+        self.nonsense += 1;
+        self.why = Some(why.to_owned());
+        self.why_stands = false;
+    }
+
     pub(super) fn record_event(&mut self, message: &Value) {
         self.event_count += 1;
         let said = message.get("event").unwrap_or(message);

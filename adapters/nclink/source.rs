@@ -126,7 +126,7 @@ impl NcLinkSource {
             match message.subject {
                 Subject::Register | Subject::Version => registered = true,
                 Subject::Sample if registered => {
-                    self.track.record_nonsense("it came before the model that belongs to it was known".to_owned());
+                    self.track.record_dropped("it came before the model that belongs to it was known");
                 }
                 _ => self.record_message(message, &session.model),
             }

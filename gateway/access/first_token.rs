@@ -49,11 +49,12 @@ impl Access {
         if self.first_token_of(name).is_none() {
             return Ok(());
         }
-        let spent = self.change_persons(|persons| {
-            persons.mark_first_used(name);
-            Ok(())
-        });
-        spent.await.map_err(|error| SignInError::Unreadable(error.to_string()))
+        match self.change_persons(|persons| Ok(persons.mark_first_used(name))).await {
+            Ok(true) => Ok(()),
+            // Another sign-in with the same token was faster.
+            Ok(false) => Err(SignInError::FirstToken),
+            Err(error) => Err(SignInError::Unreadable(error.to_string())),
+        }
     }
 }
 
@@ -92,6 +93,8 @@ mod tests {
         let bearer = format!("admin:{}", token.text());
         assert_eq!(access.of_bearer(&bearer, HERE, Urgency::Waits).await, Err(SignInError::FirstToken));
         assert!(access.of_bearer(&bearer, HERE, Urgency::GivesBack).await.is_ok(), "the machine is given back");
+        let after = access.of_bearer(&bearer, HERE, Urgency::Waits).await;
+        assert_eq!(after, Err(SignInError::FirstToken), "giving back opens nothing else");
         let cookie = access.sign_in("admin", &token, HERE).await.expect("once").cookie;
         assert!(access.of_cookie(&cookie).is_some(), "the session goes on");
         assert_eq!(access.sign_in("admin", &token, HERE).await, Err(SignInError::FirstToken));

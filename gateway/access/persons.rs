@@ -213,10 +213,11 @@ impl Persons {
         Ok((token, revoked))
     }
 
-    /// The token of the first start has signed in.
-    pub(super) fn mark_first_used(&mut self, name: &str) {
-        if let Ok(PersonEntry { first: Some(first), .. }) = self.find_entry_mut(name) {
-            first.has_signed_in = true;
+    /// The token of the first start signs in; false where it has done so already.
+    pub(super) fn mark_first_used(&mut self, name: &str) -> bool {
+        match self.find_entry_mut(name) {
+            Ok(PersonEntry { first: Some(first), .. }) => !std::mem::replace(&mut first.has_signed_in, true),
+            _ => true,
         }
     }
 

@@ -340,8 +340,10 @@ impl Access {
         if urgency == Urgency::Waits {
             self.check_first_token(&person.name, from, false)?;
         }
+        // Neither the token of the first start nor somebody who was not verified is remembered.
+        let lasting = self.hash_of(&person.name).filter(|_| self.first_token_of(&person.name).is_none());
+        let Some(token_hash) = lasting else { return Ok(person) };
         let (name, until) = (person.name.clone(), Instant::now() + BEARER_KEPT);
-        let token_hash = self.hash_of(&name).unwrap_or_default();
         let mut bearers = lock(&self.bearers);
         bearers.retain(|_, bearer| Instant::now() < bearer.until);
         if bearers.len() < BEARERS_MAX {

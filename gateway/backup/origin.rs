@@ -2,6 +2,7 @@
 //! another box has learned comes into force here only when somebody says so.
 
 use super::BackupError;
+use adapter_core::unique_id::generate_unique_id;
 use gateway_base::files::{read_text, replace_durably};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -35,8 +36,8 @@ impl BoxOrigin {
         let number = match read_text(&path, 100) {
             Ok(text) => text.trim().to_owned(),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                let fresh: String = random_text().map_err(say)?.chars().take(DIGITS).collect();
-                replace_durably(&path, &format!("{fresh}\n")).map_err(say)?;
+                let fresh: String = generate_unique_id().chars().take(DIGITS).collect();
+                replace_durably(&path, format!("{fresh}\n")).map_err(say)?;
                 fresh
             }
             Err(error) => return Err(say(error)),
@@ -67,11 +68,6 @@ impl BoxOrigin {
     pub(super) fn parse(json: &[u8]) -> Option<Self> {
         serde_json::from_slice(json).ok()
     }
-}
-
-/// A random number of the system, as text.
-fn random_text() -> std::io::Result<String> {
-    read_text(Path::new("/proc/sys/kernel/random/uuid"), 100)
 }
 
 #[cfg(test)]

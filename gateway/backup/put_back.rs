@@ -84,6 +84,9 @@ impl Replacement {
     pub(super) fn put_all<T>(mut self, last: impl FnOnce() -> Result<T, RestoreError>) -> Result<T, RestoreError> {
         match self.put_files().and_then(|()| last()) {
             Ok(given) => {
+                for kept in self.done.iter().filter_map(|replaced| replaced.path_before.as_ref()) {
+                    let _left = fs::remove_file(kept);
+                }
                 // What is left of it costs space only; the next restore removes it.
                 let _left = fs::remove_dir_all(&self.folder);
                 Ok(given)
@@ -120,7 +123,8 @@ impl Replacement {
             return Ok(Some(kept));
         }
         let mut beside = path.as_os_str().to_owned();
-        beside.push(".writing");
+        // Not the name under which the new text waits.
+        beside.push(".before-restore");
         let beside = PathBuf::from(beside);
         fs::copy(path, &beside).map_err(RestoreError::of_file(path))?;
         Ok(Some(beside))

@@ -169,7 +169,7 @@ pub fn advise_on_read_error(error: &std::io::Error) -> &'static str {
 /// # Errors
 /// The file or its directory cannot be written; what was there before stays.
 pub fn replace_file(path: &Path, text: &str) -> std::io::Result<()> {
-    let fresh = write_beside(path, text, Readers::AsBefore)?;
+    let fresh = write_beside(path, text.as_bytes(), Readers::AsBefore)?;
     std::fs::rename(&fresh.path, path)
 }
 
@@ -177,8 +177,8 @@ pub fn replace_file(path: &Path, text: &str) -> std::io::Result<()> {
 ///
 /// # Errors
 /// As for [`replace_file`].
-pub fn replace_durably(path: &Path, text: &str) -> std::io::Result<()> {
-    rename_durably(&write_beside(path, text, Readers::AsBefore)?, path)
+pub fn replace_durably(path: &Path, content: impl AsRef<[u8]>) -> std::io::Result<()> {
+    rename_durably(&write_beside(path, content.as_ref(), Readers::AsBefore)?, path)
 }
 
 /// The same as [`replace_durably`], for a file that nobody but its owner may read (mode 600).
@@ -186,7 +186,7 @@ pub fn replace_durably(path: &Path, text: &str) -> std::io::Result<()> {
 /// # Errors
 /// As for [`replace_file`].
 pub fn replace_privately(path: &Path, text: &str) -> std::io::Result<()> {
-    rename_durably(&write_beside(path, text, Readers::OwnerAlone)?, path)
+    rename_durably(&write_beside(path, text.as_bytes(), Readers::OwnerAlone)?, path)
 }
 
 /// Who may read a file that is replaced.
@@ -230,10 +230,10 @@ impl FreshFile {
 /// # Errors
 /// As for [`replace_file`].
 pub fn prepare_replacement(path: &Path, text: &str) -> std::io::Result<FreshFile> {
-    write_beside(path, text, Readers::AsBefore)
+    write_beside(path, text.as_bytes(), Readers::AsBefore)
 }
 
-fn write_beside(path: &Path, text: &str, readers: Readers) -> std::io::Result<FreshFile> {
+fn write_beside(path: &Path, content: &[u8], readers: Readers) -> std::io::Result<FreshFile> {
     use std::os::unix::fs::OpenOptionsExt;
     let directory = directory_of(path);
     owner::create_directories(directory)?;
@@ -242,7 +242,7 @@ fn write_beside(path: &Path, text: &str, readers: Readers) -> std::io::Result<Fr
     let _none_left = std::fs::remove_file(&fresh);
     let mode = if readers == Readers::OwnerAlone { 0o600 } else { 0o666 };
     let mut file = std::fs::OpenOptions::new().write(true).create_new(true).mode(mode).open(&fresh)?;
-    file.write_all(text.as_bytes())?;
+    file.write_all(content)?;
     owner::give_to_owner(&file, path, directory)?;
     if let (Readers::AsBefore, Ok(before)) = (readers, std::fs::metadata(path)) {
         file.set_permissions(before.permissions())?;

@@ -7,7 +7,8 @@ use crate::backup::{BackupPaths, RestoreRequest, archive_name, collect_files, co
 use crate::clock;
 use adapters::clock::SECOND_NS;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use gateway_base::files::replace_durably;
+use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(super) struct BackupArguments {
@@ -46,19 +47,6 @@ fn to_cannot_run(what: impl ToString) -> CannotRun {
     CannotRun::new(what.to_string(), "")
 }
 
-/// The archive takes its name only when all of it is on the disk.
-fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut writing = path.as_os_str().to_owned();
-    writing.push(".writing");
-    let written = std::fs::write(&writing, bytes)
-        .and_then(|()| std::fs::File::open(&writing)?.sync_all())
-        .and_then(|()| std::fs::rename(&writing, path));
-    written.inspect_err(|_| {
-        // What is left of it has another name.
-        let _left = std::fs::remove_file(&writing);
-    })
-}
-
 pub(super) fn run_backup(arguments: &BackupArguments) -> CommandResult {
     let config = load_configuration(arguments.config.as_deref())?;
     let (_, at_s) = read_clock();
@@ -66,7 +54,7 @@ pub(super) fn run_backup(arguments: &BackupArguments) -> CommandResult {
         collect_files(&BackupPaths::from_config(&config, arguments.config.as_deref())).map_err(to_cannot_run)?;
     let archive = pack(&files, at_s).map_err(to_cannot_run)?;
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(archive_name("backup", at_s)));
-    write_whole(&out, &archive).map_err(|error| to_cannot_run(format!("{}: {error}", out.display())))?;
+    replace_durably(&out, &archive).map_err(|error| to_cannot_run(format!("{}: {error}", out.display())))?;
     print_text(&format!("{}: {} files, {} bytes\n", out.display(), files.len(), archive.len()));
     match &arguments.history {
         Some(copy) => {

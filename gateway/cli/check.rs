@@ -58,7 +58,7 @@ fn read_declared_settings(config: Option<&Path>) -> Result<Vec<Declared>, Cannot
 
 fn report_problems(arguments: &CheckArguments) -> CommandResult {
     if arguments.has_limits {
-        gateway_base::limits::limit_memory_and_processor();
+        gateway_base::limits::limit_memory_and_time().map_err(CannotRun::from_error)?;
     }
     let unreadable = arguments.config.as_deref().filter(|path| std::fs::File::open(path).is_err());
     if let Some(path) = unreadable {

@@ -105,13 +105,20 @@ pub enum ChildJob {
     Preview(PreviewJob),
 }
 
+/// The program that runs now, also where its file has been replaced meanwhile.
+///
+/// # Errors
+/// The system does not say where it lies.
+pub fn find_own_program() -> std::io::Result<PathBuf> {
+    if cfg!(target_os = "linux") { Ok(PathBuf::from("/proc/self/exe")) } else { std::env::current_exe() }
+}
+
 /// Starts a child on a job.
 ///
 /// # Errors
 /// No process could be started.
 pub fn start(job: &impl Serialize) -> std::io::Result<Child> {
-    let program = if cfg!(target_os = "linux") { PathBuf::from("/proc/self/exe") } else { std::env::current_exe()? };
-    let mut child = Command::new(program)
+    let mut child = Command::new(find_own_program()?)
         .arg(COMMAND)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

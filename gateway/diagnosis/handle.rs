@@ -100,8 +100,8 @@ struct DiagnosisState {
     onsets: Vec<Onset>,
     /// Seconds per row of the last one: from these follows about how long the next one takes.
     pace_s: Option<f64>,
-    /// What the machine has delivered lately, and when it was read.
-    recent: Option<(Instant, Arc<Recording>)>,
+    /// What the machine has delivered lately, and when it was read; nothing where nothing is stored that would tell.
+    recent: Option<(Instant, Option<Arc<Recording>>)>,
 }
 
 /// See the [module](self). Clones are handles of the same diagnoses.
@@ -285,15 +285,19 @@ impl DiagnosisHandle {
     fn read_recent(&self) -> Option<Arc<Recording>> {
         let known = self.lock().recent.clone().filter(|(since, _)| since.elapsed() < RECENT_FOR);
         if let Some((_, recent)) = known {
-            return Some(recent);
+            return recent;
         }
+        let recent = self.load_recent().map(Arc::new);
+        self.lock().recent = Some((Instant::now(), recent.clone()));
+        recent
+    }
+
+    fn load_recent(&self) -> Option<Recording> {
         let (_, newest_ns) = Reader::open(&self.history).ok()?.read_span().ok()??;
         let output = self.lock().model.as_ref()?.model.output.clone();
         let recent = stretch::read(&self.history, newest_ns - RECENT_NS, newest_ns, &output).ok()?;
         // A machine that was off all the time tells nothing of what it delivers.
         recent.find_numbers(&output).filter(|numbers| numbers.count_present() > 0)?;
-        let recent = Arc::new(recent);
-        self.lock().recent = Some((Instant::now(), Arc::clone(&recent)));
         Some(recent)
     }
 

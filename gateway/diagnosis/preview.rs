@@ -6,7 +6,7 @@ use super::clicked_map::ClickedMap;
 use super::map_file::{MapProposal, ProposedColumn};
 use adapter_core::bilingual::Bilingual;
 use gateway_base::files::{read_text, replace_file};
-use gateway_base::limits::{MEMORY_TOLD_MB, PROCESSOR_S, limit_memory_and_processor};
+use gateway_base::limits::{MEMORY_TOLD_MB, PROCESSOR_S, limit_memory_and_time};
 use recording::read::{Preview, preview_recording, preview_rows};
 use recording::{Mapping, NoteKind, RecordingError};
 use serde::{Deserialize, Serialize};
@@ -14,11 +14,8 @@ use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
-use std::time::Duration;
 use thiserror::Error;
 
-/// The child ends itself after this time on the wall, however busy the box is.
-const WALL_MAX: Duration = Duration::from_secs(50);
 /// Rows that are shown.
 const ROWS_SHOWN: usize = 6;
 /// The longest answer of a child, bytes.
@@ -39,11 +36,7 @@ pub struct PreviewJob {
 
 /// The child: reads the file and writes one line.
 pub(super) fn run_job(job: &PreviewJob) -> std::io::Result<()> {
-    limit_memory_and_processor();
-    std::thread::Builder::new().name("limit".to_owned()).spawn(|| {
-        std::thread::sleep(WALL_MAX);
-        std::process::exit(3);
-    })?;
+    limit_memory_and_time()?;
     let document = match &job.clicked_map {
         Some(clicked) => propose_map(&job.preview, clicked),
         None => build_document(&job.preview, &job.name),

@@ -7,9 +7,9 @@
 
 use super::database::DatabaseError;
 use super::row::FleetRow;
-use super::schema::{self, PARTITIONED, Partition, Partitioning};
+use super::schema::{self, Partitioning};
 use serde_json::Value as Json;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::HashMap;
 use tokio_postgres::{Client, Transaction};
 
 /// Of the advisory lock: any number that nothing else uses.
@@ -83,7 +83,7 @@ impl KnownMoves {
 const COUNT: &str = "SELECT count(*) FROM clock_moves";
 
 /// Does the item tell that others move?
-pub(super) fn tells_moves(row: &FleetRow<'_>) -> bool {
+fn tells_moves(row: &FleetRow<'_>) -> bool {
     let moves = |record: &Json| record["kind"] == "clock_redated" && record["detail"]["moves"].is_array();
     row.kind == "event" && row.record.as_ref().is_some_and(moves)
 }
@@ -106,6 +106,11 @@ impl<'r> MovesOfBatch<'r> {
             }
         }
         Self(moves)
+    }
+
+    /// Does none of them tell a move?
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
     }
 
     /// Does one of them move this item?
@@ -132,12 +137,7 @@ async fn create_partitions(transaction: &Transaction<'_>) -> Result<(), Database
         SELECT fleet_time((fleet_shifted(record, by_ns) ->> 'until_ns')::bigint) FROM moving WHERE kind = 'gap') AS times WHERE at IS NOT NULL";
     let days: Vec<i64> =
         transaction.query(days, &[]).await.map_err(moving_error)?.iter().map(|row| row.get(0)).collect();
-    let wanted: BTreeSet<Partition> = PARTITIONED
-        .iter()
-        .filter(|table| !table.name.ends_with("_means"))
-        .flat_map(|table| days.iter().filter_map(|day| table.partition_at(*day)))
-        .collect();
-    schema::create_within(transaction, &wanted).await
+    schema::create_within(transaction, &schema::list_partitions(&days)).await
 }
 
 /// Where stretches were taken away, the ones before them end elsewhere.

@@ -1,7 +1,7 @@
 //! A message of the stream as a row. Pure.
 
 use adapters::clock::TimeNs;
-use gateway_history::parse_nested_json;
+use gateway_history::{NOT_RUNNING, parse_nested_json};
 use serde::Deserialize;
 use serde_json::Value as Json;
 use std::borrow::Cow;
@@ -19,8 +19,6 @@ const VALUES_MAX: usize = 5_000;
 
 /// Fields of records that are times.
 const TIMES: [&str; 6] = ["at_ns", "began_ns", "ended_ns", "from_ns", "to_ns", "until_ns"];
-/// Why there is a gap before the first sample of a run.
-const NOT_RUNNING: &str = "not_running";
 
 /// One item, ready to be written.
 #[derive(Debug, Clone, PartialEq)]

@@ -10,7 +10,7 @@ use tokio_postgres::{Client, Transaction};
 /// The version of the tables that this program writes.
 const VERSION: i32 = 3;
 /// The statements that create the tables of the fleet database.
-pub const TABLES: &str = include_str!("schema/tables.sql");
+pub const TABLES: &str = concat!(include_str!("schema/tables.sql"), include_str!("schema/clock_moves.sql"));
 /// The views and functions.
 pub const VIEWS: &str = include_str!("schema/views.sql");
 /// Records of a batch into their tables.
@@ -205,23 +205,30 @@ async fn detect_partitioning(transaction: &Transaction<'_>) -> Result<Partitioni
     Ok(if declared { Partitioning::Declared } else { Partitioning::Timescale })
 }
 
+/// The partitions of every table that hold these times, microseconds since 1970.
+pub(super) fn list_partitions(times_us: &[i64]) -> BTreeSet<Partition> {
+    PARTITIONED.iter().flat_map(|table| times_us.iter().filter_map(|at_us| table.partition_at(*at_us))).collect()
+}
+
 async fn create_tables(transaction: &Transaction<'_>, partitioning: Partitioning) -> Result<(), NatsError> {
     let text = format!("{}{VIEWS}\nINSERT INTO fleet_schema (version) VALUES ({VERSION});", tables_of(partitioning));
     transaction.batch_execute(&text).await.map_err(to_nats_error("creating the tables"))
 }
 
+fn tell_move(from: i32) {
+    let text = format!("the tables are brought from version {from} to {VERSION}; this may take minutes");
+    Notice::new(Severity::Info, "tables_move", text).write_to_logs();
+}
+
 async fn from_1(transaction: &Transaction<'_>, partitioning: Partitioning) -> Result<(), NatsError> {
-    let moving = to_nats_error("bringing the tables from version 1 to 2");
-    Notice::new(Severity::Info, "tables_move", "the tables are brought from version 1 to 2; this may take minutes")
-        .write_to_logs();
+    let moving = to_nats_error("bringing the tables from version 1");
+    tell_move(1);
     transaction.batch_execute(FROM_1[0]).await.map_err(moving)?;
     create_tables(transaction, partitioning).await?;
     let times = "SELECT (extract(epoch FROM min(at)) * 1000000)::bigint FROM items_1 GROUP BY date_trunc('day', at)";
     let days: Vec<i64> = transaction.query(times, &[]).await.map_err(moving)?.iter().map(|row| row.get(0)).collect();
     if partitioning == Partitioning::Declared {
-        let partitions =
-            PARTITIONED.iter().flat_map(|table| days.iter().filter_map(|at_us| table.partition_at(*at_us)));
-        let statements: Vec<String> = partitions.collect::<BTreeSet<_>>().into_iter().map(|it| it.create).collect();
+        let statements: Vec<String> = list_partitions(&days).into_iter().map(|it| it.create).collect();
         transaction.batch_execute(&statements.join(";")).await.map_err(moving)?;
     }
     let text = format!("{INCOMING_RECORDS}{}{RECORDS}DROP TABLE incoming;", FROM_1[1]);
@@ -229,12 +236,10 @@ async fn from_1(transaction: &Transaction<'_>, partitioning: Partitioning) -> Re
 }
 
 async fn from_2(transaction: &Transaction<'_>) -> Result<(), NatsError> {
-    Notice::new(Severity::Info, "tables_move", "the tables are brought from version 2 to 3; this may take minutes")
-        .write_to_logs();
-    let moves = TABLES.split_inclusive(";\n").find(|text| text.contains("CREATE TABLE clock_moves"));
-    let text =
-        format!("{FROM_2}{}{VIEWS}\nINSERT INTO fleet_schema (version) VALUES ({VERSION});", moves.unwrap_or_default());
-    transaction.batch_execute(&text).await.map_err(to_nats_error("bringing the tables from version 2 to 3"))
+    tell_move(2);
+    let moves = include_str!("schema/clock_moves.sql");
+    let text = format!("{FROM_2}{moves}{VIEWS}\nINSERT INTO fleet_schema (version) VALUES ({VERSION});");
+    transaction.batch_execute(&text).await.map_err(to_nats_error("bringing the tables from version 2"))
 }
 
 /// Where the records of a batch lie before they go into their tables.

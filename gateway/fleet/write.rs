@@ -104,10 +104,10 @@ impl Database {
         rows.sort_by(|a, b| {
             (&a.row.box_name, a.row.at_ns, a.row.sequence).cmp(&(&b.row.box_name, b.row.at_ns, b.row.sequence))
         });
-        let encoded = self.encode_rows(&rows);
+        let told = MovesOfBatch::from_rows(rows.iter().map(|arrived| arrived.row));
+        let (encoded, moves) = (self.encode_rows(&rows, &told), !told.is_empty());
         self.create_missing_partitions(&encoded.partitions).await?;
         let mut transaction = self.client.transaction().await.map_err(writing_error)?;
-        let moves = rows.iter().any(|arrived| redate::tells_moves(arrived.row));
         if !self.moves.lock(&transaction, moves).await? {
             let said = NatsError::new("another reader has put the clock of a box right meanwhile", "it is tried again");
             return Err(DatabaseError { said, of_the_data: false });
@@ -148,11 +148,10 @@ impl Database {
         Ok(())
     }
 
-    fn encode_rows(&self, rows: &[Arrived<'_>]) -> Encoded {
+    fn encode_rows(&self, rows: &[Arrived<'_>], moves: &MovesOfBatch<'_>) -> Encoded {
         let (mut items, mut records) = (CopyRows::new(), CopyRows::new());
         let (mut latest, mut of_levels) = (Latest::default(), [const { None::<MeanRows> }; means::LEVELS.len()]);
         let mut times = BTreeSet::new();
-        let moves = MovesOfBatch::from_rows(rows.iter().map(|arrived| arrived.row));
         for Arrived { row, arrived_us } in rows {
             let Some(box_id) = self.names.box_id(&row.box_name) else { continue };
             let series: Vec<i32> = row.series_names().filter_map(|series| self.names.series_id(series)).collect();
@@ -260,11 +259,12 @@ fn copy_latest(latest: &Latest) -> CopyRows {
     copied
 }
 
+/// A box that is new has the time of whatever came first; one that is known keeps its time where a batch tells nothing of now.
 const MERGE_LATEST: &str = "
 INSERT INTO box_latest AS known (box_id, last_at, last_arrival, last_sequence, cells)
 SELECT box_id, coalesce(last_at, first_at), last_arrival, last_sequence, cells FROM incoming_latest
 ON CONFLICT (box_id) DO UPDATE SET
-  last_at = greatest(known.last_at, excluded.last_at),
+  last_at = greatest(known.last_at, (SELECT last_at FROM incoming_latest WHERE incoming_latest.box_id = known.box_id)),
   last_arrival = greatest(known.last_arrival, excluded.last_arrival),
   last_sequence = greatest(known.last_sequence, excluded.last_sequence),
   cells = coalesce(fleet_cells(known.cells, excluded.cells), '{}')";

@@ -6,8 +6,9 @@
 //! box. A limit that chatters therefore stops the machine once and not fifty times. A request of its own (a second worn edge) that was
 //! held back by the latch of another passes when that has been seen to, if a script still asks for it.
 
+use super::hold::EXECUTION;
 use adapter_core::words::execution;
-use adapter_core::{ChannelId, LadderRequest, Sample};
+use adapter_core::{LadderRequest, Sample};
 use rules::script::{Stop, StopRequest};
 use std::sync::Arc;
 
@@ -67,7 +68,6 @@ struct StandingRequest {
     /// It waits until the one that is latched has been seen to.
     waits: bool,
 }
-const EXECUTION: ChannelId = ChannelId::find_constant("execution");
 
 /// One kind of request.
 #[derive(Debug, Clone, Default)]
@@ -185,7 +185,7 @@ impl Asks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use adapter_core::{Slot, Value};
+    use adapter_core::{ChannelId, Slot, Value};
 
     fn sample(word: &str) -> Sample {
         let mut sample = Sample::new_empty(0);

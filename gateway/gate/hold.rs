@@ -103,7 +103,7 @@ impl fmt::Display for Hold {
 }
 
 const MODE: ChannelId = ChannelId::find_constant("mode");
-const EXECUTION: ChannelId = ChannelId::find_constant("execution");
+pub(super) const EXECUTION: ChannelId = ChannelId::find_constant("execution");
 const FEED: ChannelId = ChannelId::find_constant("feed_mm_min");
 const SPEED: ChannelId = ChannelId::find_constant("spindle_speed_rpm");
 const ALARM: ChannelId = ChannelId::find_constant("alarm");

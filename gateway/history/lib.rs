@@ -101,8 +101,8 @@ pub use list::{AlarmEntry, RecordSpan, StateHour, StateInterval};
 pub use options::{DAY_NS, ExtraSeries, ExtraValue, Fidelity, Options, Retention, SeriesKind, WhenFull};
 pub use outbox::parse_nested_json;
 pub use outbox::{
-    Cell, Content, DeliveryState, Gap, Item, ItemMove, Outbox, OutboxFigures, OutboxHead, OutboxReader, OutboxSettings,
-    OutboxStretch, Position, RESENT_EPOCH, Reading, ResentItems, SeriesInfo, SeriesMean, box_id,
+    Cell, Content, DeliveryState, Gap, Item, ItemMove, NOT_RUNNING, Outbox, OutboxFigures, OutboxHead, OutboxReader,
+    OutboxSettings, OutboxStretch, Position, RESENT_EPOCH, Reading, ResentItems, SeriesInfo, SeriesMean, box_id,
 };
 pub use overview::{Buckets, Overview};
 pub use query::{Chunk, Query, STATE_SERIES};

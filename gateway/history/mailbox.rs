@@ -247,6 +247,12 @@ impl Mailbox {
         self.lock_state().stopped
     }
 
+    /// Would a record that is handed in now be taken?
+    pub(crate) fn takes_records(&self) -> bool {
+        let state = self.lock_state();
+        !state.stopped && state.waiting_records() < self.queue_records
+    }
+
     pub(crate) fn measure_queue(&self) -> QueueFigures {
         let state = self.lock_state();
         QueueFigures {

@@ -32,10 +32,10 @@ pub struct WriterLife {
 }
 
 impl WriterLife {
-    /// Is the thread there, and does the disk take what it writes?
+    /// Is the thread there, is there room for a record, and does the disk take what is written?
     #[must_use]
     pub fn is_live(&self) -> bool {
-        !self.mailbox.is_stopped() && !self.status.is_degraded()
+        self.mailbox.takes_records() && !self.status.is_degraded()
     }
 }
 

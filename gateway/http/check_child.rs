@@ -1,12 +1,15 @@
 //! `check` of a text that is not saved: the command `check` itself, as a child process with limits. So the page and the command line cannot
 //! find different things, and what the text names (recordings, models, scripts) is not read in the gateway.
 
-use gateway_base::files::replace_durably;
+use gateway_base::files::replace_privately;
+use gateway_base::limits::{MEMORY_TOLD_MB, PROCESSOR_S};
 use gateway_config::Problem;
+use gateway_diagnosis::child::find_own_program;
 use serde::Deserialize;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
+use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
 
 /// What `check --json` says, as far as it is needed here.
@@ -15,25 +18,42 @@ struct CheckDocument {
     problems: Vec<Problem>,
 }
 
+/// One check at a time, whoever asks: so much memory and one file beside the configuration, not more.
+static ALONE: Mutex<()> = Mutex::new(());
+
 /// Everything that is wrong with this text in the place of the file, and with what it names.
 pub(super) fn check_text(path: &Path, text: &str) -> Vec<Problem> {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let name = path.display().to_string();
-    let failed = |what: String, next: &str| vec![Problem::in_file(name.clone(), what, next)];
-    // Beside the file: paths in it are taken from there.
+    // Beside the file: paths in it are taken from there. The text may hold passwords.
     let beside = path.with_extension(format!("check-{}.toml", std::process::id()));
-    if let Err(error) = replace_durably(&beside, text) {
-        return failed(
-            format!("it cannot be checked: {}: {error}", beside.display()),
-            "look at the permissions of its folder",
-        );
+    if let Err(error) = replace_privately(&beside, text) {
+        let what = format!("it cannot be checked: {}: {error}", beside.display());
+        return vec![Problem::in_file(name, what, "look at the permissions of its folder")];
     }
-    let checked = run_check(&beside);
+    let problems = check_file(&beside, &name);
     let _already_gone = std::fs::remove_file(&beside);
-    match checked {
-        Ok(problems) => problems.into_iter().map(|problem| rename_file(problem, &beside, &name)).collect(),
-        Err(what) => {
-            failed(format!("checking it broke off: {what}"), "a recording or model that it names is too large")
+    problems
+}
+
+/// Everything that is wrong with the saved file, and with what it names.
+pub(super) fn check_saved_file(path: &Path) -> Vec<Problem> {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    check_file(path, &path.display().to_string())
+}
+
+/// What the child says of a file, under the name that a person knows.
+fn check_file(file: &Path, name: &str) -> Vec<Problem> {
+    let failed = |what: String, next: &str| vec![Problem::in_file(name.to_owned(), what, next)];
+    match run_check(file) {
+        Ok(problems) => problems.into_iter().map(|problem| rename_file(problem, file, name)).collect(),
+        Err(CheckBreak::Start(error)) => {
+            failed(format!("no process to check it with: {error}"), "try again; if it stays, start the gateway again")
         }
+        Err(what) => failed(
+            format!("checking it took more than {MEMORY_TOLD_MB} MB or {PROCESSOR_S} s, or broke off: {what}"),
+            "make the recordings and models that it names smaller, or run `cnc-gateway check` at the box",
+        ),
     }
 }
 
@@ -49,9 +69,7 @@ enum CheckBreak {
 }
 
 fn run_check(beside: &Path) -> Result<Vec<Problem>, CheckBreak> {
-    let running = PathBuf::from("/proc/self/exe");
-    let program = if running.exists() { Ok(running) } else { std::env::current_exe() };
-    let output = Command::new(program?)
+    let output = Command::new(find_own_program()?)
         .args(["check", "--json", "--limited", "--config"])
         .arg(beside)
         .stdin(Stdio::null())

@@ -8,7 +8,7 @@
 //! file whose content is sent as a password: who may edit the page may not read every file of the box.
 
 use super::ServerState;
-use super::check_child::check_text as check_text_in_child;
+use super::check_child::{check_saved_file, check_text as check_text_in_child};
 use super::guard::with_audit_note;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
@@ -151,7 +151,7 @@ async fn read_file(State(shared): State<ServerState>) -> Result<Json<Value>, Api
     run_blocking(move || {
         let path = file_path(&shared)?;
         let text = read_limited(&path)?;
-        let problems = problems_json(&find_problems(&path, &text));
+        let problems = problems_json(&parse_text(&path, &text).err().unwrap_or_else(|| check_saved_file(&path)));
         Ok(Json(json!({ "schema": "configuration-file/1", "path": path.display().to_string(), "text": text,
             "digest": digest_of(&text), "problems": problems, "restarts": is_started_by_service_manager() })))
     })

@@ -22,7 +22,7 @@ pub struct Resender {
     /// From one item to the next, s.
     pace_s: f64,
     next: Option<Instant>,
-    /// Items that the receiver has taken, and those that it will never take.
+    /// Items that the receiver has taken.
     pub sent_count: u64,
     /// Items that the receiver will never take.
     pub refused_count: u64,

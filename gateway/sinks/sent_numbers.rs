@@ -11,7 +11,8 @@ pub(super) struct SentNumbers(Vec<Range<u64>>);
 
 impl SentNumbers {
     pub(super) fn contains(&self, number: u64) -> bool {
-        self.0.iter().any(|stretch| stretch.contains(&number))
+        let place = self.0.partition_point(|stretch| stretch.end <= number);
+        self.0.get(place).is_some_and(|stretch| stretch.contains(&number))
     }
 
     pub(super) fn insert(&mut self, number: u64) {

@@ -94,7 +94,7 @@ pub(crate) fn written_moment(text: &str) -> Option<WrittenMoment> {
 /// Halves of the day, each first one before noon.
 const HALVES: [&str; 12] = ["AM", "PM", "am", "pm", "a.m.", "p.m.", "上午", "下午", "午前", "午後", "오전", "오후"];
 /// The first letters of months in English and German, with the number of each.
-const MONTHS: [(&str, i8); 16] = [
+const MONTHS: [(&str, i8); 17] = [
     ("jan", 1),
     ("feb", 2),
     ("mar", 3),
@@ -111,14 +111,14 @@ const MONTHS: [(&str, i8); 16] = [
     ("okt", 10),
     ("nov", 11),
     ("dec", 12),
+    ("dez", 12),
 ];
 
 /// The month at the beginning of a text, and what follows its letters.
 fn take_month(text: &str) -> Option<(i8, &str)> {
     let end = text.find(|c: char| !c.is_alphabetic()).unwrap_or(text.len());
     let word = text[..end].to_lowercase();
-    let known = MONTHS.iter().find(|(start, _)| word.starts_with(start)).map(|(_, month)| *month);
-    let month = known.or_else(|| word.starts_with("dez").then_some(12))?;
+    let month = MONTHS.iter().find(|(start, _)| word.starts_with(start)).map(|(_, month)| *month)?;
     Some((month, text[end..].trim_start_matches('.')))
 }
 

@@ -18,7 +18,7 @@ use std::sync::Arc;
 const DIAGNOSIS_BYTES_MAX: usize = 200_000;
 
 /// Why there is a gap before the first sample of a run.
-pub(super) const NOT_RUNNING: &str = "not_running";
+pub const NOT_RUNNING: &str = "not_running";
 
 #[derive(Debug, Deserialize)]
 struct OutboxLine {

@@ -43,6 +43,7 @@ pub(crate) use gather::Gatherer;
 pub use handle::{DeliveryState, Outbox, OutboxFigures, OutboxHead};
 pub use item::parse_nested_json;
 pub use item::{Cell, Content, Gap, Item, Reading, SeriesInfo, SeriesMean};
+pub use line::NOT_RUNNING;
 pub use position::Position;
 pub use reader::{OutboxReader, OutboxStretch};
 pub use redate::ItemMove;

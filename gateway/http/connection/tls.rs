@@ -91,7 +91,7 @@ impl Certificate {
             let trouble = |error: std::io::Error| CertificateError::Make(format!("{}: {error}", directory.display()));
             files::replace_privately(&key, &secret).map_err(trouble)?;
             files::replace_durably(&certificate, &chain).map_err(trouble)?;
-            files::replace_durably(&made, &now.now_ns.to_string()).map_err(trouble)?;
+            files::replace_durably(&made, now.now_ns.to_string()).map_err(trouble)?;
         }
         Self::read(&certificate, &key)
     }

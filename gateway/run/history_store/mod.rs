@@ -232,7 +232,9 @@ impl HistoryStore {
     /// Hands in a row of the audit; false when it will not be stored.
     pub fn append_audit(&mut self, row: Audit) -> bool {
         let stored = self.writer.as_ref().is_some_and(|writer| writer.queue_record(row.clone()).is_some());
-        if let Some(recent) = self.recent.as_ref().filter(|_| stored) {
+        // What a thread that broke off does not take any more is recovered from there, as after a kill.
+        let is_recovered = stored || self.writer.as_ref().is_some_and(Writer::is_stopped);
+        if let Some(recent) = self.recent.as_ref().filter(|_| is_recovered) {
             recent.keep_row(row);
         }
         stored

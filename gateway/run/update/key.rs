@@ -71,7 +71,7 @@ impl UpdateKey {
     /// The disk is full, or this user may not write there.
     pub fn keep(&self, home: &Path) -> Result<(), UpdateError> {
         let path = home.join(FILE);
-        replace_durably(&path, &format!("{}\n", self.text)).map_err(UpdateError::file_error(&path))
+        replace_durably(&path, format!("{}\n", self.text)).map_err(UpdateError::file_error(&path))
     }
 
     /// The key to verify with: the one that is kept. Another one is refused.

@@ -194,7 +194,7 @@ impl VersionSlots {
             sync_folder(&starts)
         };
         counted().map_err(UpdateError::file_error(&starts))?;
-        gateway_base::files::replace_durably(&note, &trial.to_line()).map_err(UpdateError::file_error(&note))?;
+        gateway_base::files::replace_durably(&note, trial.to_line()).map_err(UpdateError::file_error(&note))?;
         remove_if_there(&self.home.join(ROLLED_BACK))
     }
 

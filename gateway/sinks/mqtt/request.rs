@@ -48,7 +48,8 @@ pub(super) fn document_of(payload: &[u8]) -> Result<RequestDocument, RequestRefu
 }
 
 const FORMS: &str = "write {\"request\":\"feed_override\",\"pct\":80}, {\"request\":\"withdraw\"} or \
-                     {\"request\":\"acknowledge_alarm\",\"code\":\"...\"}";
+                     {\"request\":\"acknowledge_alarm\",\"code\":\"...\"}, each with \
+                     \"id\":\"...\" and \"issued_at\":\"2026-01-31T08:15:00Z\"";
 
 impl RequestDocument {
     pub(super) fn into_change(self) -> Result<RequestedChange, RequestRefusal> {

@@ -6,7 +6,7 @@
 
 use super::estimate::{Lag, LagSettings};
 use super::fit::{PowerModel, Ready, residual_sum_of_squares};
-use super::profile::find_minimum;
+use super::profile::{STEP_S, find_minimum, list_lags};
 use super::speed::Transient;
 use numerics::statistics::count_to_f64;
 
@@ -18,8 +18,6 @@ const BETTER: f64 = 1.3;
 /// Two lags of a change agree within this, s, and within this share of the change.
 const AGREE_S: f64 = 0.05;
 const AGREE_SHARE: f64 = 0.3;
-/// Step of the lags that are tried, s.
-const STEP_S: f64 = 0.05;
 
 /// A transient whose lag is not the known one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,9 +85,8 @@ fn find_departure(transient: &Transient, known: &Lag, settings: &LagSettings) ->
     }
     let residual = |lag_s: f64| residual_sum_of_squares(&one, &model, lag_s, known.window_s);
     let known_s = known.predict_lag(one.middle_s);
-    let count = ((settings.lags_s.1 - settings.lags_s.0) / STEP_S).round();
-    let lags = (0..).map(f64::from).take_while(|step| *step <= count).map(|step| settings.lags_s.0 + STEP_S * step);
-    let nearest_s = lags.min_by(|a, b| residual(*a).total_cmp(&residual(*b)))?;
+    let tried = list_lags(settings.lags_s).map(|lag_s| (lag_s, residual(lag_s)));
+    let (nearest_s, _) = tried.min_by(|a, b| a.1.total_cmp(&b.1))?;
     let lag_s = find_minimum(nearest_s, STEP_S, (nearest_s - STEP_S, nearest_s + STEP_S), residual);
     let off_s = lag_s - known_s;
     // Noise that the model has anyway counts on both sides.

@@ -5,7 +5,7 @@ use super::fit::{FittedLag, PredictorSet, Ready, fit_transients};
 /// Windows that are tried before the best one is refined, s.
 const WINDOWS_S: [f64; 6] = [0.03, 0.1, 0.2, 0.4, 0.7, 1.2];
 /// Step of the lags that are tried, s.
-const STEP_S: f64 = 0.05;
+pub(super) const STEP_S: f64 = 0.05;
 
 /// The best lag and window.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +47,7 @@ pub(super) fn search_at(
     Best { lag_s, window_s, fitted, rival: find_rival_minimum(&course, at), at_end: at == 0 || at + 1 == course.len() }
 }
 
-fn list_lags((from_s, to_s): (f64, f64)) -> impl Iterator<Item = f64> {
+pub(super) fn list_lags((from_s, to_s): (f64, f64)) -> impl Iterator<Item = f64> {
     let mut next_s = from_s;
     std::iter::from_fn(move || {
         let lag_s = next_s;

@@ -79,7 +79,7 @@ impl LearnedLoad {
         self.path_mm += step_s * now.feed_mm_min.map_or(1.0, |feed| feed / 60.0);
         let part = self.part.unwrap_or(0.0);
         let place = self.places.get_mut(key);
-        let learned = place.as_ref().is_some_and(|place| part - place.first_part >= limits.parts && place.is_known());
+        let learned = place.as_ref().is_some_and(|place| place.is_learned(part, limits.parts));
         let feed = now.in_force_pct.map_or(1.0, |pct| pct / 100.0);
         match place {
             Some(place) if learned => {
@@ -156,7 +156,7 @@ impl LearnedLoad {
             self.air_before += if now.feeds_in_air { step_s * per_s } else { 0.0 };
             return;
         };
-        let learned = part - place.first_part >= limits.parts && place.is_known();
+        let learned = place.is_learned(part, limits.parts);
         place.parts.follow_part(part, learned);
         // Power near that of the cut is no air, whatever the state is called.
         let missing = power_w + SURE_SD * sd_w < AIR_SHARE * place.mean_power_w();

@@ -73,6 +73,11 @@ impl Place {
         self.seconds >= KNOWN_S && self.power_w > 0.0
     }
 
+    /// Is it known, and are the parts over from which it is learned?
+    pub(super) fn is_learned(&self, part: f64, parts: f64) -> bool {
+        part - self.first_part >= parts && self.is_known()
+    }
+
     /// One more moment, weighted by its time; `feed` is the override in force, as a share.
     pub(super) fn learn_moment(&mut self, path_mm: f64, power_w: f64, feed: f64, step_s: f64) {
         let (off_path, off_power) = (path_mm - self.path_mm, power_w - self.power_w);

@@ -103,7 +103,7 @@ fn the_history_breaks_off_and_nobody_writes_on() {
 
 #[test]
 #[ignore = "1 minute: a start of the program for each of ten kinds of thread, which breaks off"]
-fn every_thread_breaks_off_once_and_the_gate_is_disarmed() {
+fn ten_kinds_of_thread_break_off_and_the_gate_is_disarmed() {
     for thread in KINDS {
         println!("{thread}: disarmed and told {} ms later", breaks_and_disarms(thread).as_millis());
     }

@@ -97,10 +97,10 @@ pub(crate) fn cable(directory: &Path) -> Cable {
     Cable { _socat: running, ours, theirs }
 }
 
-/// The only source of an address.
 /// Register profiles made for tests.
 pub(crate) const PROFILES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/meters");
 
+/// The only source of an address.
 pub(crate) fn source(address: &str) -> Box<dyn Source> {
     let address: Address = address.parse().unwrap_or_else(|error| panic!("{error}"));
     let opened = adapters::open::open_address(&address, 0).unwrap_or_else(|error| panic!("{error}"));

@@ -85,8 +85,7 @@ fn dump(plant: &Plant) -> String {
         "SELECT began, ended FROM part_list ORDER BY ended",
         "SELECT since, until, reason FROM gap_list ORDER BY since",
         "SELECT at, name, mean, seconds FROM minutes ORDER BY at, name",
-        // Not yet: `last_at`, which items that come again move to the time they were first dated.
-        "SELECT cells FROM box_latest",
+        "SELECT cells, last_at FROM box_latest",
     ]
     .map(|sql| plant.postgres.sql(sql))
     .join("\n")

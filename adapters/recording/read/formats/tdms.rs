@@ -249,8 +249,10 @@ impl TdmsFile {
             let name = channel.unit.as_ref().map_or_else(|| name.clone(), |unit| format!("{name} [{unit}]"));
             let cells = match channel.values {
                 TdmsValues::Numbers(values) => {
-                    let scaled = find_scaling(&channel.path, &channel.scaling, &inherited)
-                        .map_or_else(|| Ok(values.clone()), |scaling| scaling.scale_values(&values));
+                    let scaled = match find_scaling(&channel.path, &channel.scaling, &inherited) {
+                        Some(scaling) => scaling.scale_values(values),
+                        None => Ok(values),
+                    };
                     ColumnCells::Numbers(scaled.map_err(|kind| {
                         RecordingError::with_format_reason(
                             &input.file,

@@ -32,12 +32,12 @@ impl TdmsScaling {
     }
 
     /// The values of the channel; `Err`: the kind of a scale that is not computed.
-    pub(super) fn scale_values(&self, raw: &[f64]) -> Result<Vec<f64>, String> {
+    pub(super) fn scale_values(&self, raw: Vec<f64>) -> Result<Vec<f64>, String> {
         let is_scaled = self.texts.get("NI_Scaling_Status").is_some_and(|status| status == "scaled");
         let last = self.list_scales().into_iter().next_back().filter(|_| !is_scaled);
-        let Some(last) = last else { return Ok(raw.to_vec()) };
+        let Some(last) = last else { return Ok(raw) };
         let steps = self.list_steps(last)?;
-        Ok(raw.iter().map(|value| steps.iter().fold(*value, |x, step| compute_polynomial(step, x))).collect())
+        Ok(raw.into_iter().map(|value| steps.iter().fold(value, |x, step| compute_polynomial(step, x))).collect())
     }
 
     fn list_scales(&self) -> Vec<u32> {
@@ -97,9 +97,9 @@ mod tests {
     fn raw_values_become_those_of_the_channel() {
         let linear = [("NI_Scale[0]_Linear_Slope", 0.1), ("NI_Scale[0]_Linear_Y_Intercept", 2.0)];
         let kind = ("NI_Scale[0]_Scale_Type", "Linear");
-        assert_eq!(build_scaling(&linear, &[kind]).scale_values(&[50.0]), Ok(vec![7.0]));
+        assert_eq!(build_scaling(&linear, &[kind]).scale_values(vec![50.0]), Ok(vec![7.0]));
         assert_eq!(
-            build_scaling(&linear, &[kind, ("NI_Scaling_Status", "scaled")]).scale_values(&[50.0]),
+            build_scaling(&linear, &[kind, ("NI_Scaling_Status", "scaled")]).scale_values(vec![50.0]),
             Ok(vec![50.0])
         );
         let chain = [
@@ -112,8 +112,8 @@ mod tests {
             ("NI_Scale[1]_Polynomial_Input_Source", 0.0),
         ];
         let both = [kind, ("NI_Scale[1]_Scale_Type", "Polynomial")];
-        assert_eq!(build_scaling(&chain, &both).scale_values(&[50.0]), Ok(vec![99.0]));
-        let table = build_scaling(&[], &[("NI_Scale[0]_Scale_Type", "Table")]).scale_values(&[1.0]);
+        assert_eq!(build_scaling(&chain, &both).scale_values(vec![50.0]), Ok(vec![99.0]));
+        let table = build_scaling(&[], &[("NI_Scale[0]_Scale_Type", "Table")]).scale_values(vec![1.0]);
         assert!(table.is_err_and(|kind| kind.contains("Table")));
     }
 }

@@ -103,9 +103,6 @@ pub(super) fn refuse_by_name(head: &[u8], input: &Input) -> Result<(), Recording
     if head.get(257..262) == Some(b"ustar") {
         return Err(build_refusal(input, "a tar archive", UNPACK));
     }
-    if head.starts_with(b"PK\x03\x04") {
-        refuse_archive(input)?;
-    }
     Ok(())
 }
 
@@ -118,8 +115,7 @@ fn build_refusal(input: &Input, name: &str, (cure, cure_zh): (&str, &str)) -> Re
 }
 
 /// An archive that is no workbook.
-fn refuse_archive(input: &Input) -> Result<(), RecordingError> {
-    let Some(bytes) = input.read_whole(super::UNPACKED_BYTES_MAX)? else { return Ok(()) };
+pub(super) fn refuse_archive(bytes: &[u8], input: &Input) -> Result<(), RecordingError> {
     let Ok(archive) = zip::ZipArchive::new(std::io::Cursor::new(bytes)) else { return Ok(()) };
     let is_workbook = |name: &str| name == "mimetype" || name == "[Content_Types].xml" || name.starts_with("xl/");
     let names: Vec<String> = archive.file_names().filter_map(|name| Some(name.ok()?.into_owned())).collect();

@@ -19,6 +19,7 @@ const DAYS_1904: f64 = 1462.0;
 pub(super) fn open(input: &Input, sheet: Option<&str>) -> Result<MemoryTable, RecordingError> {
     let bytes = super::read_whole(input)?;
     if bytes.starts_with(b"PK") {
+        super::unread::refuse_archive(&bytes, input)?;
         unpacks_within_limit(&bytes, input)?;
     } else if has_encrypted_package(&bytes) {
         return Err(build_password_error(input));
