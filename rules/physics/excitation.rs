@@ -144,7 +144,7 @@ pub(crate) fn mark_rows_since_run(scene: &Scene, run: &str) -> Option<Vec<f64>> 
 }
 
 /// Squared deviations gained from which a level is taken to have begun.
-const BEGUN: f64 = 12.0;
+pub const BEGUN: f64 = 12.0;
 
 /// One from the last run of a stretch, `first to last`, on. In each earlier run of the stretch one in the rows whose earlier rows of
 /// the same run tell that `step` has begun, behind a noise of this deviation in the unit of the output; zero before the stretch.

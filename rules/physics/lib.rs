@@ -17,7 +17,7 @@ mod unit;
 
 use adapter_core::channel::quantity::Quantity;
 pub use catalogue::{CATALOGUE, find_effect};
-pub use excitation::format_run_stretch;
+pub use excitation::{BEGUN, format_run_stretch};
 pub use scene::{LinearLaw, OutputKind, PAUSE_PERIODS, Role, Scene, SceneError};
 pub use unit::{find_quantity_unit, resolve_unit};
 

@@ -142,7 +142,7 @@ pub struct Fits {
     pub before: Quality,
     /// The model refitted with it, as it is written: what the file does.
     pub after: Quality,
-    /// A free curve in its place, which no law could beat; `None` where nothing was found.
+    /// The free curve that was found in its place; `None` where nothing was found.
     pub ceiling: Option<Quality>,
 }
 

@@ -84,11 +84,16 @@ pub struct NothingToTellApart {
 /// # Errors
 /// [`NothingToTellApart`].
 pub fn plan_experiments(diagnosis: &Diagnosis, recording: &Recording) -> Result<Plan, NothingToTellApart> {
+    plan_within(diagnosis, &Envelope::from_recording(recording, &diagnosis.output, &diagnosis.model.roles))
+}
+
+/// The same within what the machine has shown that it can do.
+pub(crate) fn plan_within(diagnosis: &Diagnosis, envelope: &Envelope) -> Result<Plan, NothingToTellApart> {
     let kinds = list_experiment_kinds(diagnosis);
     if kinds.is_empty() {
         return Err(NothingToTellApart { verdict: diagnosis.verdict });
     }
-    Ok(build_plan(&kinds, &Envelope::from_recording(recording, &diagnosis.output, &diagnosis.model.roles)))
+    Ok(build_plan(&kinds, envelope))
 }
 
 /// The plan of these kinds, one experiment after the other.
@@ -111,7 +116,7 @@ pub fn build_plan(kinds: &[&str], envelope: &Envelope) -> Plan {
 /// The kinds whose experiments separate what is left: that of the next experiment first, then those of every explanation
 /// that is still open, then those that the best explanation is usually confused with: a recording in which little was
 /// varied cannot even tell that they compete.
-fn list_experiment_kinds(diagnosis: &Diagnosis) -> Vec<&str> {
+pub(crate) fn list_experiment_kinds(diagnosis: &Diagnosis) -> Vec<&str> {
     let asked = diagnosis.next_experiment.iter().map(|experiment| experiment.effect.as_str());
     if diagnosis.alternatives.is_empty() && diagnosis.missing.is_empty() && diagnosis.next_experiment.is_none() {
         return Vec::new();

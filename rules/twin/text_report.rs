@@ -1,6 +1,7 @@
 //! The whole diagnosis in plain words for standard output, in English or Chinese.
 
 use super::diagnosis::{Alternative, Diagnosis, Fits, Missing, ParameterEstimate, Shift, Verdict};
+use super::plan::list_experiment_kinds;
 use super::region::Region;
 use physics::explain::Language;
 use physics::find_effect;
@@ -182,8 +183,8 @@ impl Say<'_> {
         if let Some(ceiling) = &fit.ceiling {
             let error = format_short_number(ceiling.held_out_rmse.unwrap_or(ceiling.rmse));
             lines.push(self.language.select_text(
-                format!("the least error of any curve in its place: {error} {unit}"),
-                format!("任何曲线在此处可达到的最小误差：{error} {unit}"),
+                format!("error of the free curve in its place: {error} {unit}"),
+                format!("自由曲线的误差：{error} {unit}"),
             ));
         }
         let (floor, rows, runs) = (format_short_number(fit.noise_floor), fit.rows, fit.runs);
@@ -271,15 +272,17 @@ impl Say<'_> {
             _ => experiment.statement.as_str(),
         };
         let minutes = format_short_number(experiment.minutes);
-        vec![
+        let mut lines = vec![
             self.language.select_text(format!("{statement} ({minutes} min)"), format!("{statement}（{minutes} min）")),
-            self.language
-                .select_text(
-                    "`diagnose --experiment PLAN.csv` writes it as a plan",
-                    "`diagnose --experiment PLAN.csv`可将试验写成计划文件",
-                )
-                .to_owned(),
-        ]
+        ];
+        if !list_experiment_kinds(diagnosis).is_empty() {
+            let (en, zh) = (
+                "`diagnose --experiment PLAN.csv` writes it as a plan",
+                "`diagnose --experiment PLAN.csv`可将试验写成计划文件",
+            );
+            lines.push(self.language.select_text(en, zh).to_owned());
+        }
+        lines
     }
 
     fn list_faults(&self, diagnosis: &Diagnosis) -> Vec<String> {

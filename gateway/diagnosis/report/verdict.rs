@@ -188,7 +188,7 @@ fn render_tiles(data: &Data<'_>, fit: &Fits) -> String {
         let error = if held { ceiling.held_out_rmse.unwrap_or(ceiling.rmse) } else { ceiling.rmse };
         html.push_str(&render_tile(
             &format!("{} <small>{unit}</small>", format_number(error)),
-            data.pick_text("least error that any curve could reach", "任何曲线可达到的最小误差"),
+            data.pick_text("error of the free curve in its place", "自由曲线的误差"),
         ));
     }
     html.push_str(&render_tile(

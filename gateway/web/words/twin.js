@@ -97,7 +97,7 @@ export const TWIN = {
     "Error on runs that took no part in fitting: {0} before, {1} after; the noise is {2}.",
     "未参与拟合的数据误差：之前 {0}，之后 {1}；噪声 {2}。",
   ],
-  ceiling_words: ["No curve in its place could fall below {0}.", "任何曲线的误差都不会低于 {0}。"],
+  ceiling_words: ["The free curve that was found in its place leaves {0}.", "所找到的自由曲线的误差为 {0}。"],
   alternatives: ["What else fits", "其他可能"],
   instead_of: ["instead of {0}", "代替 {0}"],
   experiment: ["Try this next", "建议试验"],

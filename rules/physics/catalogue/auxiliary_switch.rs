@@ -102,10 +102,11 @@ pub const LATENT: &str = "latent";
 
 /// While it is fitted, its level for each row in which it was found on; in a simulation what is expected of it.
 fn follow_latent_consumer(scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-    if let Some(on) = scene.unrecorded_state() {
-        return Some(vec![("level", on.to_vec())]);
-    }
     let value = |name| form.shape_value(name);
+    // Only the part that is being fitted has a level and no step.
+    if value("step").is_none() {
+        return Some(vec![("level", scene.unrecorded_state()?.to_vec())]);
+    }
     let levels = TwoLevels {
         step: value("step")?,
         deviation: value("deviation")?,

@@ -72,6 +72,10 @@ impl Scene {
             }
             (Some(given), _) => (given.clone(), given.clone()),
         };
+        // Without a single value there is no such column: a spindle that stands all the time has no feed per turn.
+        if cells.count_present() == 0 {
+            return;
+        }
         // What no input can tell, such as a feed per turn at standstill, is no filled value.
         let is_defined = |row: usize| follows.as_ref().is_none_or(|follows| follows.get(row).is_some());
         self.keep_column(name, &fill_by_holding(&cells, &self.runs), &told, is_defined);

@@ -12,9 +12,7 @@ use super::variant_bank::Since;
 use crate::diagnosis::UNKNOWN;
 use ndarray::{Array1, s};
 use numerics::statistics::{count_to_f64, rms};
-
-/// Squared deviations gained from which a step is taken to have begun in a held-out run.
-const BEGUN: f64 = 12.0;
+use physics::BEGUN;
 
 impl Judge<'_> {
     /// The output with what an explanation adds, and each name's contribution.

@@ -60,7 +60,7 @@ pub(super) fn write_latent_part(inputs: &RecordingInputs<'_>, part: &Part, on: &
     ];
     let form = Form { name: LATENT, ..Form::from_shape(&shape) }.with_full_share();
     let mut part = Part::from_effect(effect, &form, &["share"]);
-    part.parameters.iter_mut().filter(|p| p.entry == Entry::Shape).for_each(clamp_into_range);
+    part.parameters.iter_mut().filter(|p| p.entry == Entry::Shape).for_each(settle_shape);
     Some(part)
 }
 
@@ -82,11 +82,14 @@ pub(super) fn write_followed_step(inputs: &RecordingInputs<'_>, part: &Part, dev
     let form = Form { name: FOLLOWED, place, ..Form::from_shape(&shape) };
     let mut followed = Part::from_effect(effect, &form, &["gain"]);
     followed.parameters.iter_mut().filter(|p| p.name == "gain").for_each(|p| p.clone_from(gain));
+    followed.parameters.iter_mut().filter(|p| p.name == "deviation").for_each(settle_shape);
     followed.parameters.extend(part.parameters.iter().filter(|p| is_of_departure(p)).cloned());
     followed.departures.clone_from(&part.departures);
     Some(followed)
 }
 
-fn clamp_into_range(parameter: &mut Parameter) {
+/// Inside its range; how the state is followed was measured and is no size to be fitted again.
+fn settle_shape(parameter: &mut Parameter) {
     parameter.value = parameter.value.clamp(parameter.range.0, parameter.range.1);
+    parameter.fixed |= parameter.name != "step";
 }

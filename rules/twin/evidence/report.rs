@@ -25,7 +25,7 @@ use crate::next_step::{
     build_alternative, build_channel_experiment, describe_drive_experiment, find_effect_experiment,
 };
 use crate::place_search::PlaceSearch;
-use crate::plan::{Envelope, plan_experiments};
+use crate::plan::{Envelope, plan_within};
 use crate::prepared_recording::Case;
 use crate::region::{Condition, Region, compute_usual_size, list_spans, mark_active_rows, measure_both_signs};
 use crate::summary;
@@ -104,19 +104,27 @@ impl EvidenceReport<'_, '_> {
             model,
             debug: self.answer.debug.clone(),
         };
-        if let (Ok(plan), Some(next)) = (plan_experiments(&diagnosis, self.recording), &mut diagnosis.next_experiment) {
-            // One figure for every writer: how long the plan takes that is carried out.
-            next.minutes = plan.duration_min().ceil();
-            if Envelope::from_recording(self.recording, &self.case.model.output, &self.case.model.roles).drive_alone {
-                let (en, zh) = describe_drive_experiment(&next.effect);
-                (next.statement, next.statement_zh) = (en.to_owned(), Some(zh));
-            }
-        }
+        self.tell_next_experiment(&mut diagnosis);
         diagnosis.summary = match &withdrawn {
             Some(gone) => summary::describe_withdrawal(&gone.found, gone.among_fitted, gone.errors, &diagnosis.unit),
             None => summary::summarise_diagnosis(&diagnosis),
         };
         diagnosis
+    }
+
+    /// The experiment of a kind in the words of this machine, and how long the plan takes that is carried out: one figure for every
+    /// writer.
+    fn tell_next_experiment(&self, diagnosis: &mut Diagnosis) {
+        let envelope = Envelope::from_recording(self.recording, &self.case.model.output, &self.case.model.roles);
+        let plan = plan_within(diagnosis, &envelope).ok();
+        let Some(next) = diagnosis.next_experiment.as_mut().filter(|next| !next.effect.is_empty()) else { return };
+        if let Some(plan) = plan {
+            next.minutes = plan.duration_min().ceil();
+        }
+        if envelope.drive_alone {
+            let (en, zh) = describe_drive_experiment(&next.effect);
+            (next.statement, next.statement_zh) = (en.to_owned(), Some(zh));
+        }
     }
 
     /// What is told is what the file does: the free curve is the ceiling only. A law that does not lower the error of rows held
@@ -197,18 +205,18 @@ impl EvidenceReport<'_, '_> {
             let part = written.zip(place).map(|(written, place)| &written.parts[place]);
             let (statement, equation) = describe_law(name, part);
             let told = place.is_some() || name == UNKNOWN;
+            // Where it is the only one, its own figures are those of all.
+            let is_alone = name == UNKNOWN && self.answer.names.len() == 1;
             all.push(Missing {
                 effect: name.clone(),
                 statement,
                 equation,
                 parameters,
-                delta_ic: own
-                    .map(|own| own.information)
-                    .or_else(|| (name == UNKNOWN).then_some(self.answer.information)),
+                delta_ic: own.map(|own| own.information).or_else(|| is_alone.then_some(self.answer.information)),
                 probability: self.answer.find_probability(name),
                 held_out_rmse_before: own
                     .and_then(|own| own.error_without)
-                    .or(fits.before.held_out_rmse)
+                    .or(fits.before.held_out_rmse.filter(|_| is_alone))
                     .filter(|_| told && fits.after.held_out_rmse.is_some()),
                 held_out_rmse_after: fits.after.held_out_rmse.filter(|_| told),
                 absorbed_share: self.compute_absorbed_share(name),
@@ -361,6 +369,12 @@ fn describe_departures(part: &Part) -> String {
 
 /// Why a part cannot be simulated ahead.
 fn describe_hindrance(part: &Part) -> Option<Bilingual> {
+    if part.is_followed() && part.kind == "hardness_batch" {
+        return Some(Bilingual::new(
+            "The run in which this lot begins is not known: it is followed from earlier rows of the same run and cannot be simulated ahead",
+            "不知该批料从哪一批次开始：只能由同一批次的先前各行跟踪，无法预先仿真",
+        ));
+    }
     if part.is_followed() {
         return Some(Bilingual::new(
             "Nobody records when it is on: it is followed from earlier rows of the same run and cannot be simulated ahead",

@@ -35,7 +35,7 @@ impl EvidenceReport<'_, '_> {
             laws.push(law.as_ref().map(|(_, share)| (self.baseline.parts.len() + near.len(), *share)));
             near.extend(law.map(|(part, _)| (name, part)));
         }
-        let fit = if self.answer.names.is_empty() { None } else { self.fit_named_laws(&near) };
+        let fit = if near.is_empty() { None } else { self.fit_named_laws(&near) };
         Textbook { laws, fit }
     }
 

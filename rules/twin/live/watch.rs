@@ -9,8 +9,7 @@ use std::collections::BTreeMap;
 
 /// Blocks from which a regime is learned, at least.
 const LEARN_BLOCKS: usize = 100;
-/// Compared seconds of work before anything is learned: parts, lots and the warm-up must have been seen. A machine that stands still shows
-/// none of them.
+/// Compared seconds before anything is learned: parts, lots and the warm-up must have been seen.
 const LEARN_S: f64 = 6.0 * 3600.0;
 /// Blocks kept while learning; beyond, what there is must do.
 const BLOCKS_MAX: usize = 4000;
@@ -147,8 +146,7 @@ impl Watch {
         speed: f64,
         second: SettledSecond,
     ) -> Option<Notice> {
-        let stands_still = what.as_ref().is_some_and(|(regime, _)| *regime == Regime::Standby);
-        self.compared_s += if stands_still { 0.0 } else { 1.0 };
+        self.compared_s += 1.0;
         let (regime, work, second) = self.settling.add_second(what, speed, second)?;
         let work = self.find_work_number(work);
         let block = self.gathering.add_second(regime, work, second)?;
