@@ -43,14 +43,14 @@ fn the_box_itself_is_looked_after_from_the_page() {
     let address = gateway.address();
     let token = person(&place.join("data"), "Root", "admin");
     let mut browser = Browser::start(place);
-    browser.open(&format!("http://{address}/audit?lang=en"));
+    browser.open(&format!("http://{address}/box?lang=en"));
     browser.wait_until("document.body?.dataset.fresh === 'yes'");
     for (method, path) in [("POST", "/api/v1/doctor"), ("POST", "/api/v1/restore"), ("PUT", "/api/v1/operations")] {
         assert_eq!(ask(&mut browser, method, path, &json!({})).0, 401, "{path}");
     }
     assert_eq!((get(&address, "/api/v1/backup").status, get(&address, "/api/v1/support").status), (401, 401));
     sign_in(&mut browser, "Root", &token);
-    browser.open(&format!("http://{address}/audit?lang=en"));
+    browser.open(&format!("http://{address}/box?lang=en"));
     browser.wait_until(
         "document.body?.dataset.fresh === 'yes' && document.querySelectorAll('.recipe tbody tr').length === 1",
     );
