@@ -4,6 +4,9 @@ use super::{Cells, Numbers, Recording};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
+/// Those that follow from other rows as well: what was counted before the recording began is in the recorded ones.
+pub const OF_OTHER_ROWS: [&str; 2] = ["spindle_acceleration_rpm_per_s", "cutting_time_min"];
+
 /// Names that can be derived, each after those that it follows from.
 pub const DERIVABLE: [&str; 6] = [
     "feed_per_rev_mm",

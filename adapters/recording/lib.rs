@@ -6,7 +6,7 @@
 mod derive;
 pub mod read;
 
-pub use derive::{DERIVABLE, derive_quantity, with_derived};
+pub use derive::{DERIVABLE, OF_OTHER_ROWS, derive_quantity, with_derived};
 pub use read::mapping::{ColumnMapping, Mapping, MappingError, TimeMapping};
 pub use read::plan::{Note, NoteKind};
 pub use read::{ReadRecording, RecordingError, RowProblem, read_csv, read_path, read_path_as};

@@ -141,6 +141,20 @@ struct Linearised<'a> {
     sizes: Vec<f64>,
 }
 
+/// What is known beforehand of the parameters, as further rows of their columns: a departure is near zero, beside a noise of this
+/// variance. Gives what these rows leave.
+pub(super) fn add_prior_rows(parts: &[Part], free: &[Free], columns: &mut [Vec<f64>], variance: f64) -> Vec<f64> {
+    let mut left = Vec::new();
+    for (index, at) in free.iter().enumerate() {
+        let parameter = &parts[at.part].parameters[at.parameter];
+        let Some(deviation) = parameter.prior_deviation() else { continue };
+        let weight = variance.sqrt() / deviation;
+        left.push(-weight * parameter.value);
+        columns.iter_mut().enumerate().for_each(|(other, c)| c.push(if other == index { weight } else { 0.0 }));
+    }
+    left
+}
+
 impl<'a> Linearised<'a> {
     fn new(
         parts: &'a [Part],
@@ -152,13 +166,7 @@ impl<'a> Linearised<'a> {
         let mut left = compute_weighted_residual(metric, total);
         let mut columns: Vec<Vec<f64>> = tangents.iter().map(|tangent| (metric.weigh)(tangent)).collect();
         let rows = left.len();
-        for (index, at) in free.iter().enumerate() {
-            let parameter = &parts[at.part].parameters[at.parameter];
-            let Some(deviation) = parameter.prior_deviation() else { continue };
-            let weight = ridge.sqrt() / deviation;
-            left.push(-weight * parameter.value);
-            columns.iter_mut().enumerate().for_each(|(other, c)| c.push(if other == index { weight } else { 0.0 }));
-        }
+        left.extend(add_prior_rows(parts, free, &mut columns, ridge));
         let sizes: Vec<f64> = columns.iter().map(|column| rms(&column[..rows]).max(f64::MIN_POSITIVE)).collect();
         for ((column, size), tangent) in columns.iter_mut().zip(&sizes).zip(tangents) {
             let unseen = metric.has_bounds && *size < SEEN * rms(tangent);

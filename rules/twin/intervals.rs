@@ -14,7 +14,7 @@
 //!    may not pass through the load loss that the model knows.
 
 use super::diagnosis::ParameterEstimate;
-use super::fit::Fit;
+use super::fit::{Fit, add_prior_rows};
 use super::linear::{dot, extend_basis, least_squares, project_out};
 use super::model::{Part, PartFunction};
 use numerics::statistics::count_to_f64;
@@ -60,7 +60,8 @@ impl FittedRows<'_> {
         let white: Vec<Vec<f64>> = fit.tangents.iter().map(|tangent| (self.whiten)(tangent)).collect();
         let freedom = innovations.len().saturating_sub(fit.free.len()).max(1);
         let variance = dot(&innovations, &innovations) / count_to_f64(freedom);
-        let known = self.add_prior_rows(&white, variance);
+        let mut known = white.clone();
+        add_prior_rows(&fit.parts, &fit.free, &mut known, variance);
         let inverse = least_squares(&known, &vec![0.0; known.first().map_or(0, Vec::len)]).inverse;
         let among_units = compute_sandwich_variances(&white, &innovations, &inverse, &self.unit);
         let passed_on = self.compute_load_loss_factor(part);
@@ -97,18 +98,6 @@ impl FittedRows<'_> {
                 }
             })
             .collect()
-    }
-
-    /// The columns with what is known beforehand as further rows, as in the fit: a departure is near zero.
-    fn add_prior_rows(&self, white: &[Vec<f64>], variance: f64) -> Vec<Vec<f64>> {
-        let mut columns = white.to_vec();
-        for (index, free) in self.fit.free.iter().enumerate() {
-            let parameter = &self.fit.parts[free.part].parameters[free.parameter];
-            let Some(deviation) = parameter.prior_deviation() else { continue };
-            let weight = variance.sqrt() / deviation;
-            columns.iter_mut().enumerate().for_each(|(other, c)| c.push(if other == index { weight } else { 0.0 }));
-        }
-        columns
     }
 
     /// What one unit more in the cut comes to at the output if the load loss that the model has acts on this part too; one

@@ -2,12 +2,10 @@
 //! some thousand rows (`evidence/gram.rs`), and each of them takes ten kilobytes while every law stands beside it.
 
 use adapter_core::bilingual::Bilingual;
-use recording::{Cells, Recording, derive_quantity};
+use recording::{Cells, OF_OTHER_ROWS, Recording, derive_quantity};
 
 /// Rows that are compared, at most: ten kilobytes each are six hundred megabytes. Of fewer nothing is left out.
 const ROWS_MAX: usize = 60_000;
-/// Quantities that follow from rows that are left out.
-const OF_ROWS_BETWEEN: [&str; 2] = ["spindle_acceleration_rpm_per_s", "cutting_time_min"];
 
 /// The rows that are compared.
 #[derive(Debug)]
@@ -37,7 +35,7 @@ pub fn thin_recording(whole: &Recording) -> Option<ThinnedRecording> {
     for column in whole.columns().iter().filter(|column| !column.name.ends_with("_missing")) {
         recording.set_column(&column.name, column.cells.take_rows(&rows));
     }
-    for name in OF_ROWS_BETWEEN {
+    for name in OF_OTHER_ROWS {
         if whole.find_numbers(name).is_none_or(|numbers| numbers.count_present() == 0)
             && let Some(numbers) = derive_quantity(whole, name)
         {

@@ -1,14 +1,11 @@
 //! The columns of a scene: gaps are filled first, and products of inputs are formed of what is complete.
 
 use super::Scene;
-use recording::{Cells, DERIVABLE, Numbers, Recording, Words, derive_quantity};
+use recording::{Cells, DERIVABLE, Numbers, OF_OTHER_ROWS, Recording, Words, derive_quantity};
 use std::ops::Range;
 
 /// Rows without a word, one after the other, beyond which the word is not known any more.
 const WORD_GAP_MAX: usize = 3;
-/// Quantities that follow from other rows as well: what was counted before the recording began is in the recorded ones.
-const OF_OTHER_ROWS: [&str; 2] = ["spindle_acceleration_rpm_per_s", "cutting_time_min"];
-
 /// What they follow from.
 const SOURCES: [&str; 9] = [
     "run",

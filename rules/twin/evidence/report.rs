@@ -12,7 +12,7 @@ use super::noise::NoiseModel;
 use super::textbook::Textbook;
 use super::thresholds::THRESHOLDS;
 use super::written_model::WrittenModel;
-use crate::departure::{DEPARTURE, Departure};
+use crate::departure::{DEPARTURE, Departure, is_of_departure};
 use crate::diagnosis::{
     Alternative, Diagnosis, Experiment, Fits, Missing, ParameterEstimate, Quality, Rows, Shift, UNKNOWN, Verdict,
     find_output_unit,
@@ -32,7 +32,7 @@ use crate::summary;
 use crate::text_report::{format_short_number, format_signed_number};
 use adapter_core::bilingual::Bilingual;
 use numerics::statistics::{count_to_f64, rms};
-use physics::find_effect;
+use physics::{Entry, find_effect};
 use recording::Recording;
 
 /// Times that a name of impossible size is replaced by the nearest law beside it.
@@ -350,7 +350,8 @@ fn describe_law(name: &str, part: Option<&Part>) -> (String, String) {
     }
     let place = part.and_then(Part::effect_and_form).and_then(|(_, form)| form.place);
     let place = place.map(|(column, word)| format!(" ({column} {word})")).unwrap_or_default();
-    let departs = part.map(describe_departures).unwrap_or_default();
+    let departs =
+        part.map(|part| format!("{}{}", describe_departures(part), describe_held_shapes(part))).unwrap_or_default();
     find_effect(name).map_or_else(
         || ("The user's hypothesis".to_owned(), format!("{name}{departs}")),
         |effect| (format!("{}{place}", effect.doc().en.statement), format!("{}{departs}", effect.doc().law)),
@@ -365,6 +366,12 @@ fn describe_departures(part: &Part) -> String {
         format!("; times 1 + d over {}: {}", departure.over, knots.collect::<Vec<_>>().join(", "))
     };
     part.departures.iter().enumerate().map(of).collect()
+}
+
+/// Shapes of the law that this recording does not tell, as a line of text: the intervals of the others hold for these values.
+fn describe_held_shapes(part: &Part) -> String {
+    let held = part.parameters.iter().filter(|p| p.entry == Entry::Shape && p.fixed && !is_of_departure(p));
+    held.map(|p| format!("; {} held at {}", p.name, format_short_number(p.value))).collect()
 }
 
 /// Why a part cannot be simulated ahead.

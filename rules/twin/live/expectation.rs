@@ -14,7 +14,7 @@ use std::fmt;
 const WARM_S: f64 = 1800.0;
 
 /// Kinds that describe a stretch of a past recording and say nothing about the present.
-pub(super) const OF_THE_PAST: [&str; 2] = ["zero_drift", "auxiliary_switch"];
+const OF_THE_PAST: [&str; 2] = ["zero_drift", "auxiliary_switch"];
 
 /// Why there is no expected output, or no residual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -85,11 +85,16 @@ pub struct Simulation {
     failure: Option<String>,
 }
 
+/// Takes out what says nothing about the present.
+pub(super) fn drop_parts_of_the_past(model: &mut Model) {
+    model.parts.retain(|part| !OF_THE_PAST.contains(&part.kind.as_str()));
+}
+
 impl Simulation {
     /// `minutes` is what the tools have cut before.
     #[must_use]
     pub fn new(mut model: Model, minutes: CuttingTimes) -> Self {
-        model.parts.retain(|part| !OF_THE_PAST.contains(&part.kind.as_str()));
+        drop_parts_of_the_past(&mut model);
         model.parts.iter_mut().for_each(Part::hold_departures_over_time);
         let memory = model.parts.iter().map(|part| LookBack::from_kind(&part.kind)).max().unwrap_or(LookBack::Moment);
         Self { model, look_back: memory, window: Window::new(memory, minutes), parts: None, failure: None }

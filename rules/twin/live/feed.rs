@@ -1,7 +1,7 @@
 //! Can a running machine feed a model? A diagnosis may place an effect in a run, a lot or a column of its own file: none of them is
 //! there while the machine works, and a model that needs one would be compared with nothing from then on.
 
-use super::expectation::OF_THE_PAST;
+use super::expectation::drop_parts_of_the_past;
 use crate::bind::bind_model;
 use crate::model::Model;
 use adapter_core::channel::ChannelId;
@@ -26,7 +26,7 @@ pub fn list_unfed_inputs(model: &Model, recent: &Recording) -> Vec<String> {
         }
     }
     let mut model = model.clone();
-    model.parts.retain(|part| !OF_THE_PAST.contains(&part.kind.as_str()));
+    drop_parts_of_the_past(&mut model);
     match Scene::new(&live, &model.output, &model.roles) {
         Err(error) => vec![error.to_string()],
         Ok(scene) => bind_model(&model, &scene).err().unwrap_or_default(),
