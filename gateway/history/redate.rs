@@ -15,7 +15,7 @@ use super::record::Audit;
 use super::record_sql::add_to_state_hours;
 use super::recover::recover_file;
 use super::schema;
-use super::segments::{RECORD_TABLES, RecordMarks};
+use super::segments::{self, RECORD_TABLES, RecordMarks, STRETCHES};
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_base::clock::{ClockMark, Trust, format_span};
 use rusqlite::{Connection, OptionalExtension, params};
@@ -102,17 +102,18 @@ fn note_decided(db: &Connection, now_ns: TimeNs) -> Result<(), HistoryError> {
     .with_activity("noting the time")
 }
 
-/// The segments of this start of the computer that another clock has dated and nothing has confirmed.
+/// The segments of this start of the computer, and a run of it without rows, that another clock has dated and nothing has confirmed.
 fn find_misdated(db: &Connection, mark: &ClockMark) -> Result<Vec<Misdated>, HistoryError> {
     if mark.boot.is_empty() {
         return Ok(Vec::new());
     }
     let mut statement = db
-        .prepare(
-            "SELECT s.id, s.first_row, s.anchor_ns, s.marks, n.first_row, n.marks
-             FROM segments s LEFT JOIN segments n ON n.id = (SELECT min(id) FROM segments WHERE id > s.id)
-             WHERE s.boot = ?1 AND s.clock IN ('unset', 'plausible') AND abs(s.anchor_ns - ?2) > ?3 ORDER BY s.id",
-        )
+        .prepare(&format!(
+            "SELECT id, first_row, anchor_ns, marks, next_first_row, next_marks
+             FROM (SELECT *, lead(first_row) OVER (ORDER BY id) AS next_first_row, lead(marks) OVER (ORDER BY id) AS next_marks
+                   FROM ({STRETCHES}))
+             WHERE boot = ?1 AND clock IN ('unset', 'plausible') AND abs(anchor_ns - ?2) > ?3 ORDER BY id"
+        ))
         .with_activity("looking for rows to date anew")?;
     let marks = |text: Option<String>| text.and_then(|text| serde_json::from_str::<RecordMarks>(&text).ok());
     let rows = statement.query_map(params![mark.boot, mark.anchor_ns, WRONG_NS], |row| {
@@ -133,11 +134,7 @@ impl Misdated {
     fn redate_segment(&self, db: &Connection, mark: &ClockMark) -> Result<i64, HistoryError> {
         let (samples, before) = self.move_blocks(db)?;
         self.move_records(db)?;
-        db.execute(
-            "UPDATE segments SET start_ns = start_ns + ?2, anchor_ns = ?3, clock = ?4 WHERE id = ?1",
-            params![self.id, self.by_ns, mark.anchor_ns, mark.trust],
-        )
-        .with_activity("dating rows anew")?;
+        segments::redate_stretch(db, self.id, self.by_ns, mark)?;
         if let Some(before) = before {
             let after = before.start.saturating_add(self.by_ns)..before.end.saturating_add(self.by_ns);
             let minutes =

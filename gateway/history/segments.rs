@@ -51,13 +51,50 @@ impl RecordMarks {
     }
 }
 
+/// Key in `meta` of the run that has stored no row yet.
+const RUN_WITHOUT_ROWS: &str = "run_without_rows";
+
+/// The stretches of the file in their order, as a table of `SQLite`: the segments, and behind them the run that has stored no row yet. What
+/// that run has recorded (the control may not answer for hours) is dated by its clock, as are the rows of a segment.
+pub(crate) const STRETCHES: &str =
+    "SELECT id, first_row, anchor_ns, marks, clock, boot FROM segments
+     UNION ALL
+     SELECT 9223372036854775807, 9223372036854775807, json_extract(value, '$.anchor_ns'), json_extract(value, '$.marks'),
+            json_extract(value, '$.clock'), json_extract(value, '$.boot')
+     FROM meta WHERE key = 'run_without_rows'";
+
+/// A run begins: what is recorded from now on, before its first row as well, is dated by `clock`.
+pub(crate) fn begin_run(db: &Connection, clock: &ClockMark) -> Result<(), HistoryError> {
+    let marks = serde_json::to_value(RecordMarks::read_current(db)?).unwrap_or_default();
+    let run = serde_json::json!({
+        "anchor_ns": clock.anchor_ns, "clock": clock.trust, "boot": clock.boot, "marks": marks
+    });
+    db.execute("INSERT OR REPLACE INTO meta (key, value) VALUES (?1, ?2)", params![RUN_WITHOUT_ROWS, run.to_string()])
+        .map(drop)
+        .with_activity("beginning a run")
+}
+
+/// Its first row is there: the marks of the run are those of its first segment. `None` for a later segment.
+fn take_run_marks(db: &Connection) -> Result<Option<String>, HistoryError> {
+    db.query_row(
+        "DELETE FROM meta WHERE key = ?1 RETURNING json_extract(value, '$.marks')",
+        [RUN_WITHOUT_ROWS],
+        |row| row.get(0),
+    )
+    .optional()
+    .with_activity("beginning a segment")
+}
+
 /// Stores the beginning of a segment.
 pub(crate) fn insert(
     db: &Connection,
     segment: &Segment,
     (origin, clock): (&str, &ClockMark),
 ) -> Result<(), HistoryError> {
-    let marks = serde_json::to_string(&RecordMarks::read_current(db)?).unwrap_or_default();
+    let marks = match take_run_marks(db)? {
+        Some(marks) => marks,
+        None => serde_json::to_string(&RecordMarks::read_current(db)?).unwrap_or_default(),
+    };
     db.prepare_cached(
         "INSERT INTO segments (id, first_row, start_ns, origin, reason, version, clock, boot, anchor_ns, marks)
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
@@ -86,8 +123,34 @@ pub(crate) fn confirm_clock(db: &Connection, clock: &ClockMark) -> Result<(), Hi
         "UPDATE segments SET clock = 'confirmed' WHERE clock = 'plausible' AND boot = ?1 AND anchor_ns = ?2",
         params![clock.boot, clock.anchor_ns],
     )
+    .and_then(|_| {
+        db.execute(
+            "UPDATE meta SET value = json_set(value, '$.clock', 'confirmed')
+             WHERE key = ?1 AND json_extract(value, '$.clock') = 'plausible'",
+            [RUN_WITHOUT_ROWS],
+        )
+    })
     .map(drop)
     .with_activity("noting that the clock is confirmed")
+}
+
+/// A stretch is dated by `clock` now.
+pub(crate) fn redate_stretch(db: &Connection, id: i64, by_ns: i64, clock: &ClockMark) -> Result<(), HistoryError> {
+    db.execute(
+        "UPDATE segments SET start_ns = start_ns + ?2, anchor_ns = ?3, clock = ?4 WHERE id = ?1",
+        params![id, by_ns, clock.anchor_ns, clock.trust],
+    )
+    .and_then(|segments| {
+        if segments > 0 {
+            return Ok(segments);
+        }
+        db.execute(
+            "UPDATE meta SET value = json_set(value, '$.anchor_ns', ?2, '$.clock', ?3) WHERE key = ?1",
+            params![RUN_WITHOUT_ROWS, clock.anchor_ns, clock.trust],
+        )
+    })
+    .map(drop)
+    .with_activity("dating rows anew")
 }
 
 /// The latest time that a row stored under a confirmed clock has; it is certainly later by now. `None`: no clock was confirmed

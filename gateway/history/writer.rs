@@ -10,10 +10,10 @@ use super::options::{ExtraValue, Options};
 use super::outbox::Gatherer;
 use super::record::Record;
 use super::recover::recover_file;
-use super::schema;
 use super::series::stored_series;
 use super::status::{HistoryFigures, SharedStatus};
 use super::thread::{CommitSchedule, Thread};
+use super::{schema, segments};
 use adapter_core::Sample;
 use adapter_core::clock::TimeNs;
 use std::path::{Path, PathBuf};
@@ -67,6 +67,7 @@ impl Writer {
         schema::register_series(&mut db, &mut series)?;
         schema::note_limit(&db, options.retention.max_bytes)?;
         let end = recover_file(&mut db, options.goes_on.then_some(options.origin.as_str()))?;
+        segments::begin_run(&db, &options.clock)?;
         let outbox =
             options.outbox.clone().map(|outbox| Gatherer::open(&mut db, outbox, &series, end.last_ns)).transpose()?;
         let mailbox = Arc::new(Mailbox::new(&series, &options));

@@ -139,6 +139,35 @@ fn rows_of_a_wrong_clock_are_dated_anew_as_if_it_had_been_right() {
 }
 
 #[test]
+fn what_a_run_records_before_its_first_row_is_dated_as_its_rows() {
+    for (rows_before, rows) in [(0, 0), (0, 300), (300, 0), (300, 300)] {
+        let dir = tempfile::tempdir().expect("a directory");
+        let path = dir.path().join("h.db");
+        run(&path, 0..rows_before, "confirmed", 0);
+        let leap_ns = -3653 * DAY_NS;
+        let writer = Writer::open(&path, Options { clock: mark("unset", leap_ns), ..options() }).expect("opens");
+        let right_ns = Machine::at_ns(1_000);
+        writer.queue_record(Event { at_ns: right_ns + leap_ns, kind: "early".into(), ..Event::default() });
+        writer.flush().expect("durable");
+        let mut sample = Sample::new_empty(0);
+        for row in 1_001..1_001 + rows {
+            Machine::new().fill(row, &mut sample);
+            sample.at_ns += leap_ns;
+            writer.queue_sample(&sample, &extra_values(row));
+        }
+        writer.queue_record(Event { at_ns: right_ns + leap_ns, kind: "late".into(), ..Event::default() });
+        writer.flush().expect("durable");
+        drop(writer);
+        let redated = set_clock(&path, &mark("plausible", 0), None).expect("done").expect("some");
+        assert_eq!((redated.samples, redated.by_ns), (rows, (-leap_ns, -leap_ns)), "{rows_before} {rows}");
+        let events = Reader::open(&path).and_then(|it| it.read_events(RecordSpan::newest(100))).expect("reads");
+        let at_ns = |kind: &str| events.iter().find(|it| it.kind == kind).expect("kept").at_ns;
+        assert_eq!((at_ns("early"), at_ns("late")), (right_ns, right_ns), "{rows_before} {rows}");
+        assert_eq!(set_clock(&path, &mark("plausible", 0), None).expect("done"), None, "once");
+    }
+}
+
+#[test]
 fn a_confirmed_clock_and_another_start_of_the_computer_are_left_alone() {
     let dir = tempfile::tempdir().expect("a directory");
     let path = dir.path().join("h.db");
