@@ -147,7 +147,6 @@ impl Arming {
 
     pub(super) fn forbid_arming(&mut self, thread: &str) {
         self.gone.get_or_insert_with(|| thread.to_owned());
-        self.disarm(Disarmed::Thread);
     }
 
     pub(super) fn disarm(&mut self, why: Disarmed) {

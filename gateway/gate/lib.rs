@@ -108,6 +108,7 @@ impl Gate {
     /// From now on nobody can arm: a thread of this name is gone, and somebody has to start the gateway again.
     pub fn forbid_arming(&mut self, thread: &str) {
         self.arming.forbid_arming(thread);
+        self.disarm(Disarmed::Thread);
     }
 
     /// Ends the permission to write. The writer restores 100 % at the next verdict, which is not armed even when somebody

@@ -115,6 +115,23 @@ fn armed_without_a_machine_to_write_to_is_refused() {
     );
 }
 
+#[test]
+fn two_machines_to_write_to_are_refused() {
+    let sources = "[[source]]\nname = \"a\"\naddress = \"simulated://lathe\"\n[[source]]\nname = \"b\"\naddress = \"simulated://mill\"\n";
+    let text = |offsets: &str| {
+        format!(
+            "{sources}[gate]\nmode = \"armed\"\nsource = \"a\"\n[gate.offset]\nmode = \"armed\"\naxes = \"z\"\nsource = \"{offsets}\"\n"
+        )
+    };
+    assert!(parse(&text("a"), &[]).is_ok(), "one machine");
+    let problems = parse(&text("b"), &[]).expect_err("two machines");
+    assert!(
+        told(&problems).starts_with("cnc-gateway.toml:13:10: offsets would be written to \"b\""),
+        "{}",
+        told(&problems)
+    );
+}
+
 proptest::proptest! {
     #[test]
     fn no_text_makes_the_configuration_panic(

@@ -278,6 +278,25 @@ fn check_offsets(reading: &mut ConfigInput<'_>) {
         let next = format!("write source = ... under [gate.offset]; there is {}", quote_names(&names));
         reading.add_problem(&at_mode, "offsets may be written, but `source` does not say where to", next);
     }
+    check_single_target(reading, &at);
+}
+
+/// Override and offset go to one machine: what holds the gate back (mode, alarm, switches) is taken from the machine that is written
+/// to, and there is one such set of values.
+fn check_single_target(reading: &mut ConfigInput<'_>, at: &Origin) {
+    let target = |section: &str| {
+        let armed = find_text(reading, section, "mode").as_deref() == Some("armed");
+        find_text(reading, section, "source").filter(|_| armed)
+    };
+    let (Some(overrides), Some(offsets)) = (target("gate"), target("gate.offset")) else { return };
+    if overrides != offsets {
+        let what = format!(
+            "offsets would be written to {offsets:?} and the feed override to {overrides:?}: a gateway writes to one machine"
+        );
+        let next =
+            format!("write source = {overrides:?} under [gate.offset], or run a second gateway for the other machine");
+        reading.add_problem(at, what, next);
+    }
 }
 
 fn quote_names(names: &[String]) -> String {

@@ -15,7 +15,6 @@ const LOST_NS: i64 = 30 * SECOND_NS;
 #[derive(Debug, Clone)]
 struct StandingAlarm {
     code: String,
-    fault: SensorFault,
     since_ns: TimeNs,
     en: String,
     zh: String,
@@ -43,55 +42,55 @@ impl SensorAlarms {
         sd_um: Option<f64>,
         health: &mut Health,
     ) {
-        let code_of = |doubted: &DoubtedSensor| {
-            sensors.get(doubted.sensor).map(|channel| format!("thermal_sensor_{}", channel.name()))
-        };
         let due = |doubted: &&DoubtedSensor| doubted.fault != SensorFault::Lost || at_ns - doubted.since_ns >= LOST_NS;
-        let doubted: Vec<(String, DoubtedSensor)> =
-            watch.list_doubted().iter().filter(due).filter_map(|it| Some((code_of(it)?, *it))).collect();
+        let describe = |doubted: &DoubtedSensor| {
+            let channel = sensors.get(doubted.sensor)?;
+            let text = self.describe_alarm(doubted, channel.name(), sd_um.is_some());
+            Some((format!("thermal_sensor_{}", channel.name()), text))
+        };
+        let doubted: Vec<(String, [String; 2])> =
+            watch.list_doubted().iter().filter(due).filter_map(describe).collect();
         self.standing.retain(|alarm| {
-            let stays = doubted.iter().any(|(code, it)| *code == alarm.code && it.fault == alarm.fault);
+            let stays = doubted.iter().any(|(code, text)| *code == alarm.code && text[0] == alarm.en);
             if !stays {
                 let (code, source) = (alarm.code.clone(), super::SOURCE.to_owned());
                 health.keep_record(AlarmClear { at_ns, code, source }.into());
             }
             stays
         });
-        for (code, doubted) in doubted {
+        for (code, [en, zh]) in doubted {
             if self.standing.iter().any(|alarm| alarm.code == code) {
                 continue;
             }
-            let [en, zh] = self.describe_alarm(&doubted, sensors[doubted.sensor].name(), sd_um);
             let (source, severity) = (super::SOURCE.to_owned(), "warning".to_owned());
             let raised = Alarm { at_ns, code: code.clone(), source, severity, en: en.clone(), zh: zh.clone() };
             health.keep_record(raised.into());
-            self.standing.push(StandingAlarm { code, fault: doubted.fault, since_ns: at_ns, en, zh });
+            self.standing.push(StandingAlarm { code, since_ns: at_ns, en, zh });
         }
     }
 
-    /// What the operator reads, English and Chinese.
-    fn describe_alarm(&self, doubted: &DoubtedSensor, name: &str, sd_um: Option<f64>) -> [String; 2] {
+    /// What the operator reads, English and Chinese. It holds no figure that changes while the alarm stands: another text is another alarm.
+    fn describe_alarm(&self, doubted: &DoubtedSensor, name: &str, predicts: bool) -> [String; 2] {
         let (what, zh_what) = match doubted.fault {
             SensorFault::Lost => ("gives no value", "无数据"),
             SensorFault::Jumped => ("has changed faster than heat can", "变化快于热过程"),
             SensorFault::Frozen => ("stands still while the others have moved", "停止变化，而其他温度在变"),
             SensorFault::Contradicted => ("is contradicted by the others", "与其他温度矛盾"),
         };
-        let (then, zh_then) = match (doubted.stand_in_c, sd_um) {
-            (Some(stand_in), Some(sd_um)) => (
-                format!(
-                    "the compensation goes on without it, with {:.1} °C from the others; the prediction is uncertain by {sd_um:.1} um",
-                    stand_in.value
-                ),
-                format!("补偿不再使用该传感器，按其他温度取{:.1} °C；预测不确定度{sd_um:.1} um", stand_in.value),
-            ),
-            _ => (
+        let (then, zh_then) = if doubted.stand_in_c.is_some() && predicts {
+            (
+                "the compensation goes on without it, with a temperature from the others; the page Thermal shows the uncertainty"
+                    .to_owned(),
+                "补偿不再使用该传感器，改用由其他温度推算的值；不确定度见“热误差”页".to_owned(),
+            )
+        } else {
+            (
                 format!(
                     "there is no prediction without it: the offset stands, and goes back to 0 after {:.0} s",
                     self.hold_s
                 ),
                 format!("缺少该温度无法预测：补偿量保持，{:.0} s后回零", self.hold_s),
-            ),
+            )
         };
         [format!("{name} {what}: {then}; look at the sensor"), format!("{name}{zh_what}：{zh_then}；请检查传感器")]
     }
