@@ -5,6 +5,7 @@ use super::incoming::{Frames, Incoming};
 use super::packet::{PING, encode_puback};
 use super::{MqttError, MqttMessage, words};
 use adapter_core::stream::is_silence;
+use adapter_core::threads::reach_fault_point;
 use adapter_core::tls::TcpConnection;
 use std::io::ErrorKind;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -63,12 +64,19 @@ pub(super) struct Reader {
     pub(super) keep_alive: Duration,
 }
 
+/// Whoever waits for messages learns that none will come, also when reading broke off.
+impl Drop for Reader {
+    fn drop(&mut self) {
+        self.inbox.close(MqttError::Closed("reading has ended".to_owned()));
+        self.writer.shut_connection();
+    }
+}
+
 impl Reader {
     /// Reads until the connection ends, and says why it did.
     pub(super) fn run(mut self) {
         let why = self.read().err().unwrap_or_else(|| "closed by the broker".to_owned());
         self.inbox.close(MqttError::Closed(why));
-        self.writer.shut_connection();
     }
 
     fn read(&mut self) -> Result<(), String> {
@@ -76,6 +84,7 @@ impl Reader {
         let mut heard = Instant::now();
         self.dispatch_packets()?;
         loop {
+            reach_fault_point("mqtt");
             match self.writer.connection.read(&mut buffer) {
                 Ok(0) => return Ok(()),
                 Ok(count) => {

@@ -4,7 +4,7 @@
 use super::target::{BackupKind, keep_newest, list_own, remove_half_written};
 use super::{BackupPaths, BoxOrigin, RestoreError, RestoreRequest, collect_files, copy_history, restore_backup};
 use crate::archive::{pack, unpack};
-use adapter_core::threads::receive_work_within;
+use adapter_core::threads::{reach_fault_point, receive_work_within};
 use gateway_base::convert::seconds_to_instant;
 use gateway_base::log::{Notice, Severity};
 use gateway_config::BackupConfig;
@@ -265,6 +265,7 @@ impl BackupAttempt {
         let directory = config.directory.clone();
         let (paths, config) = (paths.clone(), config.clone());
         let work = move || {
+            reach_fault_point("backup work");
             let is_due = !is_first || newest_age(&paths, &config.directory).is_none_or(|age| age >= config.every);
             let done = match is_due {
                 true => take_backup(&paths, &config, at_s).map(Attempted::Taken),

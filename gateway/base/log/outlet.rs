@@ -3,6 +3,7 @@
 //! A pipe whose reader has stopped reading takes no more, and whoever writes to it waits for as long as that lasts. The tick
 //! must not: a line that finds no room is left out and counted, and when the stream takes lines again it says how many.
 
+use adapter_core::threads::receive_work;
 use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -38,9 +39,9 @@ impl Outlet {
     pub(super) fn start(name: &str, stream: LogStream) -> Self {
         let (lines, waiting) = sync_channel(WAITING_MAX);
         let counts = Arc::new(LineCounts::default());
-        let of_thread = counts.clone();
-        let thread =
-            std::thread::Builder::new().name(name.to_owned()).spawn(move || write_lines(&waiting, stream, &of_thread));
+        let (of_thread, own_name) = (counts.clone(), name.to_owned());
+        let write = move || write_lines(&own_name, &waiting, stream, &of_thread);
+        let thread = std::thread::Builder::new().name(name.to_owned()).spawn(write);
         Self { lines: thread.is_ok().then_some(lines), counts }
     }
 
@@ -67,9 +68,9 @@ impl Outlet {
     }
 }
 
-fn write_lines(waiting: &Receiver<Vec<u8>>, mut stream: LogStream, counts: &LineCounts) {
+fn write_lines(thread: &str, waiting: &Receiver<Vec<u8>>, mut stream: LogStream, counts: &LineCounts) {
     let mut told = 0;
-    for line in waiting {
+    while let Some(line) = receive_work(thread, waiting) {
         // Whoever closed the terminal is no reason to stop the box.
         let _closed = stream.write_all(&line).and_then(|()| stream.flush());
         let dropped = counts.dropped.load(Ordering::Acquire);

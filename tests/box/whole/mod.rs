@@ -19,7 +19,7 @@ mod replay;
 mod service;
 mod settings;
 mod system;
-mod twin;
+pub(crate) mod twin;
 mod update;
 mod update_scenarios;
 mod views;

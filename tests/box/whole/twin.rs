@@ -8,7 +8,7 @@ use std::time::Duration;
 use testkit::process::{Gateway, get, program, run, stderr, stdout, wait_for};
 
 /// What the simulated lathe does, as a patient integrator would write it down: its laws are other ones.
-pub(super) const MODEL: &str = r#"schema = "model/1"
+pub(crate) const MODEL: &str = r#"schema = "model/1"
 name = "small lathe"
 output = "spindle_power_w"
 
