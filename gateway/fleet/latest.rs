@@ -1,5 +1,6 @@
 //! The newest value of every series of the boxes of a batch. Pure.
 
+use super::means;
 use super::row::FleetRow;
 use serde_json::{Map, Value as Json, json};
 use std::collections::BTreeMap;
@@ -41,7 +42,7 @@ impl Latest {
     pub(super) fn add(&mut self, box_id: i32, row: &FleetRow<'_>, series: &[i32], arrived_us: i64) {
         let at_us = row.at_us();
         // What is told of a time that is over says nothing about now.
-        let live = row.means.is_empty() && row.kind != "gap";
+        let live = row.kind != "gap" && means::LEVELS.iter().all(|level| *level.kind != *row.kind);
         let fresh = || LatestOfBox {
             first_us: at_us,
             last_us: i64::MIN,
@@ -99,5 +100,11 @@ mod tests {
         let found = &latest.boxes[&1];
         assert_eq!((found.first_us, found.last_us, found.arrived_us, found.sequence), (10, 20, 22, 20));
         assert_eq!(found.to_json(), r#"{"3":[20,5.0]}"#);
+        // Means of a time that is over, with their values and without (a clock was put right), say nothing of now.
+        let over = |kind: &'static str| FleetRow { kind: kind.into(), numbers: Vec::new(), ..row(90, 0.0, false) };
+        for kind in ["gap", "minute", "hour", "day"] {
+            latest.add(1, &over(kind), &[], 23);
+            assert_eq!(latest.boxes[&1].last_us, 20, "{kind}");
+        }
     }
 }
