@@ -67,9 +67,9 @@ impl Writer {
         schema::register_series(&mut db, &mut series)?;
         schema::note_limit(&db, options.retention.max_bytes)?;
         let end = recover_file(&mut db, options.goes_on.then_some(options.origin.as_str()))?;
-        segments::begin_run(&db, &options.clock)?;
         let outbox =
             options.outbox.clone().map(|outbox| Gatherer::open(&mut db, outbox, &series, end.last_ns)).transpose()?;
+        segments::begin_run(&db, &options.clock)?;
         let mailbox = Arc::new(Mailbox::new(&series, &options));
         let shared = Arc::new(SharedStatus::default());
         let maintenance = Maintenance::new(path, options.retention, options.reserve_bytes);

@@ -226,6 +226,11 @@ pub trait Effect: Sync + Send {
         false
     }
 
+    /// May a machine depart from it by a factor over another quantity? Not from what is the same whatever the machine does.
+    fn may_depart(&self) -> bool {
+        true
+    }
+
     /// Does a hidden state (how worn this tool is, a pump on or off, which lot) belong to a tool, lot or stretch, so
     /// that it must be followed through a held-out run?
     fn has_hidden_state(&self) -> bool {

@@ -7,9 +7,10 @@ use physics::find_effect;
 /// Minutes of an experiment over one channel: four levels of it, up and down, twice, half a minute each, and the way there.
 const CHANNEL_MINUTES: f64 = 10.0;
 
-/// The experiment of the first of these kinds that the catalogue holds.
-pub(super) fn find_effect_experiment<'a>(mut kinds: impl Iterator<Item = &'a str>) -> Option<Experiment> {
-    let doc = kinds.find_map(find_effect)?.doc();
+/// The shortest experiment of these kinds, the first of several that take as long: each of them separates its own kind from the others.
+pub(super) fn find_effect_experiment<'a>(kinds: impl Iterator<Item = &'a str>) -> Option<Experiment> {
+    let docs = kinds.filter_map(find_effect).map(physics::Effect::doc);
+    let doc = docs.min_by(|a, b| a.experiment_minutes.total_cmp(&b.experiment_minutes))?;
     Some(build_experiment(doc.en.experiment.to_owned(), doc.experiment_minutes, doc.kind))
 }
 

@@ -160,9 +160,10 @@ fn a_ploughing_edge_is_told_from_losses_that_grow_with_the_cut() {
 
 #[test]
 fn an_offset_is_told_from_friction_and_from_a_gain() {
-    let rounds = Rounds::run(MODEL, &[(60, 900.0, None)], |_| 40.0);
+    // Three times what the machine's own warm-up, which the model lacks, changes during the experiment: less is told as a drift of the zero.
+    let rounds = Rounds::run(MODEL, &[(60, 900.0, None)], |_| 120.0);
     rounds.leaves_open("offset");
     rounds.settle("offset", &["dry_friction", "viscous_friction", "windage", "sensor_gain"]);
     let level = rounds.parameter("offset", "level");
-    assert!((level - 40.0).abs() < 8.0, "{level}");
+    assert!((level - 120.0).abs() < 12.0, "{level}");
 }

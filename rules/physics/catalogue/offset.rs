@@ -40,6 +40,10 @@ impl Effect for Offset {
         vec![Form::without_shape()]
     }
 
+    fn may_depart(&self) -> bool {
+        false
+    }
+
     fn compute_columns(&self, scene: &Scene, _form: &Form) -> Option<ParameterColumns> {
         Some(vec![("level", vec![1.0; scene.rows()])])
     }

@@ -138,6 +138,32 @@ impl EvidenceAnswer {
         }
     }
 
+    /// Lets a rival and what it stands beside exchange their places; gives the rival that takes this back.
+    pub(super) fn exchange_name(&mut self, rival: &Rival) -> Rival {
+        let Rival { name, instead_of, .. } = rival;
+        for named in [&mut self.contributions, &mut self.remaining] {
+            named.iter_mut().filter(|(known, _)| known == instead_of).for_each(|(known, _)| known.clone_from(name));
+        }
+        self.names.iter_mut().filter(|known| *known == instead_of).for_each(|known| known.clone_from(name));
+        for known in &mut self.rivals {
+            if known.name == *name && known.instead_of == *instead_of {
+                known.name.clone_from(instead_of);
+            }
+            if known.instead_of == *instead_of {
+                known.instead_of.clone_from(name);
+            }
+        }
+        Rival { name: instead_of.clone(), instead_of: name.clone(), nats: rival.nats }
+    }
+
+    /// Takes a rival out; what was likely of it is likely of the name that it stood beside.
+    pub(super) fn drop_rival(&mut self, rival: &Rival) {
+        self.rivals.retain(|known| known.name != rival.name || known.instead_of != rival.instead_of);
+        let mass = self.probabilities.remove(&rival.name).unwrap_or(0.0);
+        let told = self.probabilities.entry(rival.instead_of.clone()).or_default();
+        *told = (*told + mass).min(1.0);
+    }
+
     /// Sets something without a name beside some names: their curves are theirs, their textbook laws are not.
     pub(super) fn add_unknown_rivals(&mut self, doubted: &[String]) {
         if self.verdict == Verdict::Unexplained {

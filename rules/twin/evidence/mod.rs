@@ -49,6 +49,7 @@ mod variant_bank;
 mod variant_evidence;
 mod written_law;
 mod written_model;
+mod written_rivals;
 
 use super::diagnosis::{Diagnosis, Experiment, Rows, Verdict, find_output_unit};
 use super::fit::{Fit, Metric, fit_parts};

@@ -5,12 +5,10 @@
 //! textbook law bears out is taken back.
 
 use super::answer::{EvidenceAnswer, sum_contributions};
-use super::contributions::project_out_baseline;
 use super::gram::Comparison;
 use super::inputs::RecordingInputs;
 use super::noise::NoiseModel;
 use super::textbook::Textbook;
-use super::thresholds::THRESHOLDS;
 use super::written_model::WrittenModel;
 use crate::departure::{DEPARTURE, Departure, is_of_departure};
 use crate::diagnosis::{
@@ -35,9 +33,6 @@ use numerics::statistics::{count_to_f64, rms};
 use physics::{Entry, find_effect};
 use recording::Recording;
 
-/// Times that a name of impossible size is replaced by the nearest law beside it.
-const REPLACED_MAX: usize = 3;
-
 /// Share of the rows in which a law acts that must lie in its place: the others are edges of it.
 const ACTS_IN_PLACE: f64 = 0.98;
 
@@ -59,19 +54,15 @@ pub(super) struct EvidenceReport<'a, 'm> {
 impl EvidenceReport<'_, '_> {
     pub(super) fn into_diagnosis(mut self) -> Diagnosis {
         let curve = self.answer.after.clone();
-        let mut textbook = self.fit_textbook_laws();
-        for attempt in 0..=REPLACED_MAX {
-            let refused = self.list_refused_names(&textbook);
-            if refused.is_empty() {
-                break;
+        let (textbook, written) = self.settle_names();
+        let (textbook, written) = match written {
+            Some(written) => {
+                let (textbook, written) = self.settle_rivals(textbook, written);
+                let written = self.tell_written_model(&textbook, written);
+                (textbook, Some(written))
             }
-            let unnamed = if attempt < REPLACED_MAX { self.answer.replace_names(&refused) } else { refused };
-            if !unnamed.is_empty() {
-                self.answer.reject_names(&unnamed, |x| self.inputs.fitted_rows(false).map(|row| x[row] * x[row]).sum());
-            }
-            textbook = self.fit_textbook_laws();
-        }
-        let written = self.tell_written_model(&textbook);
+            None => (textbook, None),
+        };
         let fits = self.compare_fits(&curve);
         let missing = self.list_missing_effects(&fits, &textbook, written.as_ref());
         let open = self.list_undetermined_names(&missing);
@@ -125,41 +116,6 @@ impl EvidenceReport<'_, '_> {
             let (en, zh) = describe_drive_experiment(&next.effect);
             (next.statement, next.statement_zh) = (en.to_owned(), Some(zh));
         }
-    }
-
-    /// What is told is what the file does: the free curve is the ceiling only. A law that does not lower the error of rows held
-    /// out is taken back; one that keeps little of what the curve gains stands beside something without a name, and so does a
-    /// name that nothing can be written for.
-    fn tell_written_model(&mut self, textbook: &Textbook) -> Option<WrittenModel> {
-        if !matches!(self.answer.verdict, Verdict::Explained | Verdict::Ambiguous) {
-            return None;
-        }
-        let written = textbook.fit.as_ref().filter(|_| textbook.laws.iter().any(Option::is_some));
-        let written = written.and_then(|fit| self.write_fit(fit));
-        let error = |total: &[f64]| self.compute_told_rmse(total).unwrap_or(f64::INFINITY);
-        let (before, curve) = (error(&self.inputs.simulated), error(&self.answer.after));
-        let law = written.as_ref().map_or(f64::INFINITY, |written| error(&written.total));
-        self.answer.debug.push_str(&format!("\nwritten {law:.5} before {before:.5} curve {curve:.5}"));
-        let Some(written) = written.filter(|_| law < before) else {
-            self.answer.withdraw_names(Vec::new());
-            return None;
-        };
-        let kept = (before - law) / (before - curve).max(f64::MIN_POSITIVE);
-        let lawless = self.answer.names.iter().zip(&textbook.laws).filter(|(_, law)| law.is_none());
-        let lawless: Vec<String> = lawless.map(|(name, _)| name.clone()).collect();
-        if kept < THRESHOLDS.kept_share {
-            let names = self.answer.names.clone();
-            self.answer.add_unknown_rivals(&names);
-        } else if !lawless.is_empty() {
-            self.answer.add_unknown_rivals(&lawless);
-        }
-        self.answer.contributions = self.list_written_contributions(textbook, &written);
-        let project = |(name, x): &(String, Vec<f64>)| {
-            (name.clone(), project_out_baseline(self.inputs, &self.baseline.tangents, x))
-        };
-        self.answer.remaining = self.answer.contributions.iter().map(project).collect();
-        self.answer.after.clone_from(&written.total);
-        Some(written)
     }
 
     /// Root mean square error in the rows that are told: those held out, or the fitted ones where none were.

@@ -127,7 +127,8 @@ impl EvidenceReport<'_, '_> {
         for place in self.baseline.parts.len()..fit.parts.len() {
             let part = &fit.parts[place];
             // A state and what a meter does to the whole output know nothing of the cut.
-            let departs = !is_latent(part) && !part.acts_on_output();
+            let may_depart = part.effect_and_form().is_none_or(|(effect, _)| effect.may_depart());
+            let departs = may_depart && !is_latent(part) && !part.acts_on_output();
             let Some(own) = part.compute_contribution(&self.case.scene).filter(|_| departs) else { continue };
             for departure in self.list_departures(part, &own) {
                 let last = departure.x.len() - 1;

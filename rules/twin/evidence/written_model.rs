@@ -1,13 +1,19 @@
 //! The model as it stands in a file, and the figures of each name that it tells.
 
 use super::answer::Named;
+use super::contributions::project_out_baseline;
 use super::latent_law::{is_latent, write_followed_step, write_latent_part};
 use super::report::EvidenceReport;
 use super::textbook::Textbook;
+use super::thresholds::THRESHOLDS;
+use crate::diagnosis::{UNKNOWN, Verdict};
 use crate::fit::Fit;
 use crate::model::Part;
 use crate::simulate::simulate_written_parts;
 use numerics::statistics::count_to_f64;
+
+/// Times that names are replaced by the nearest laws beside them.
+const REPLACED_MAX: usize = 3;
 
 /// What the file of a set of names does over the recording.
 pub(super) struct WrittenModel {
@@ -29,6 +35,70 @@ pub(super) struct OwnFigures {
 }
 
 impl EvidenceReport<'_, '_> {
+    /// Names whose file is possible and lowers the error of the rows that are told: a name that is not, or does not, gives way to the nearest
+    /// law beside it, and in the end to something without a name.
+    pub(super) fn settle_names(&mut self) -> (Textbook, Option<WrittenModel>) {
+        let mut textbook = self.fit_textbook_laws();
+        for attempt in 0..=REPLACED_MAX {
+            let mut refused = self.list_refused_names(&textbook);
+            if refused.is_empty() {
+                if !matches!(self.answer.verdict, Verdict::Explained | Verdict::Ambiguous) {
+                    return (textbook, None);
+                }
+                let written = self.write_helpful_model(&textbook);
+                if written.is_some() {
+                    return (textbook, written);
+                }
+                refused.extend(self.answer.names.iter().filter(|name| *name != UNKNOWN).cloned());
+            }
+            let unnamed = if attempt < REPLACED_MAX { self.answer.replace_names(&refused) } else { refused };
+            if !unnamed.is_empty() {
+                self.answer.reject_names(&unnamed, |x| self.inputs.fitted_rows(false).map(|row| x[row] * x[row]).sum());
+            }
+            textbook = self.fit_textbook_laws();
+        }
+        (textbook, None)
+    }
+
+    /// What is written for the names; `None` where no law is, or where the file does not lower the error of the rows that are told.
+    fn write_helpful_model(&mut self, textbook: &Textbook) -> Option<WrittenModel> {
+        let fit = textbook.fit.as_ref().filter(|_| textbook.laws.iter().any(Option::is_some));
+        let written = fit.and_then(|fit| self.write_fit(fit));
+        let (before, curve) =
+            (self.compute_told_error(&self.inputs.simulated), self.compute_told_error(&self.answer.after));
+        let law = written.as_ref().map_or(f64::INFINITY, |written| self.compute_told_error(&written.total));
+        self.answer.debug.push_str(&format!("\nwritten {law:.5} before {before:.5} curve {curve:.5}"));
+        written.filter(|_| law < before)
+    }
+
+    fn compute_told_error(&self, total: &[f64]) -> f64 {
+        self.compute_told_rmse(total).unwrap_or(f64::INFINITY)
+    }
+
+    /// What is told is what the file does: the free curve is the ceiling only. A law that keeps little of what the curve gains stands beside
+    /// something without a name, and so does a name that nothing can be written for.
+    pub(super) fn tell_written_model(&mut self, textbook: &Textbook, written: WrittenModel) -> WrittenModel {
+        let (before, curve) =
+            (self.compute_told_error(&self.inputs.simulated), self.compute_told_error(&self.answer.after));
+        let law = self.compute_told_error(&written.total);
+        let kept = (before - law) / (before - curve).max(f64::MIN_POSITIVE);
+        let lawless = self.answer.names.iter().zip(&textbook.laws).filter(|(_, law)| law.is_none());
+        let lawless: Vec<String> = lawless.map(|(name, _)| name.clone()).collect();
+        if kept < THRESHOLDS.kept_share {
+            let names = self.answer.names.clone();
+            self.answer.add_unknown_rivals(&names);
+        } else if !lawless.is_empty() {
+            self.answer.add_unknown_rivals(&lawless);
+        }
+        self.answer.contributions = self.list_written_contributions(textbook, &written);
+        let project = |(name, x): &(String, Vec<f64>)| {
+            (name.clone(), project_out_baseline(self.inputs, &self.baseline.tangents, x))
+        };
+        self.answer.remaining = self.answer.contributions.iter().map(project).collect();
+        self.answer.after.clone_from(&written.total);
+        written
+    }
+
     /// Writes a fit and reads it again; `None` where the file would be refused.
     pub(super) fn write_fit(&self, fit: &Fit) -> Option<WrittenModel> {
         let left: Vec<f64> = self.recorded.iter().zip(&fit.simulated).map(|(y, f)| y - f).collect();

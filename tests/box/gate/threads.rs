@@ -53,7 +53,7 @@ fn furnish(directory: &Path, config: &Path, broker: &Broker) {
         broker.port
     );
     let written = std::fs::read_to_string(config).expect("there");
-    std::fs::write(config, written + &more).expect("written");
+    std::fs::write(config, format!("{written}{more}")).expect("written");
 }
 
 /// A running, armed box that breaks off where the file says.
