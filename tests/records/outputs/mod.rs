@@ -10,6 +10,7 @@ mod fake_sink;
 mod layouts;
 mod outage;
 mod plain;
+mod request_outcomes;
 mod requests;
 mod secured;
 mod shdr;
