@@ -15,3 +15,4 @@ mod requests;
 mod secured;
 mod shdr;
 mod sparkplug;
+mod webhook;
