@@ -223,12 +223,18 @@ impl SinkTask {
     async fn wait_held(&mut self, sink: &mut dyn Sink, until_ns: TimeNs) -> Result<(), Left> {
         let left_ns = until_ns.saturating_sub(clock::now_ns());
         let left = Duration::from_nanos(clamp_to_unsigned(left_ns)).min(HELD_LOOK_EVERY);
+        // Nobody who stops the box waits for a sink that sends nothing.
+        self.outbox.set_linked(&self.name, false);
         let wanted = tokio::select! {
-            () = sleep(left) => return Ok(()),
-            wanted = sink.wait_for_receiver() => wanted,
-            _ = self.stopping.wait_for(|stop| *stop) => return Err(Left::Stop),
+            () = sleep(left) => Ok(None),
+            wanted = sink.wait_for_receiver() => Ok(Some(wanted)),
+            _ = self.stopping.wait_for(|stop| *stop) => Err(Left::Stop),
         };
-        serve_within_deadline(sink, wanted).await
+        self.outbox.set_linked(&self.name, true);
+        match wanted? {
+            Some(wanted) => serve_within_deadline(sink, wanted).await,
+            None => Ok(()),
+        }
     }
 
     async fn deliver_batch(
