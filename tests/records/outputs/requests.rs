@@ -134,11 +134,11 @@ fn what_the_network_asks_for_is_judged_like_a_script_and_written_only_when_a_per
     host.wait("the outcome of giving back", |heard| {
         told(heard, OUTCOME).last().is_some_and(|it| it["outcome"] == "followed")
     });
-    let outcomes: Vec<Json> = told(&host.heard(), OUTCOME);
-    let words: Vec<&str> = outcomes.iter().filter_map(|it| it["outcome"].as_str()).collect();
-    assert_eq!(words, ["refused", "not_written", "refused", "limited", "followed"], "{outcomes:?}");
-    assert_eq!((&outcomes[3]["asked_pct"], &outcomes[3]["in_force_pct"]), (&Json::from(20.0), &Json::from(50.0)));
-    assert!(outcomes[3]["id"].as_str().is_some_and(|id| id.starts_with(FEED)), "{:?}", outcomes[3]);
+    let settled: Vec<Json> = told(&host.heard(), OUTCOME);
+    let words: Vec<&str> = settled.iter().filter_map(|it| it["outcome"].as_str()).collect();
+    assert_eq!(words, ["refused", "not_written", "refused", "limited", "followed"], "{settled:?}");
+    assert_eq!((&settled[3]["asked_pct"], &settled[3]["in_force_pct"]), (&Json::from(20.0), &Json::from(50.0)));
+    assert!(settled[3]["id"].as_str().is_some_and(|id| id.starts_with(FEED)), "{:?}", settled[3]);
     sending.stop();
     assert!(outcomes(&sending, "write").contains(&"written".to_owned()), "the write names who asked");
     assert!(
