@@ -36,8 +36,8 @@ fn every_shift_of_a_plant_of_known_truth_has_its_value() {
     // Of the first part of A two thirds lie in the late shift of UTC, which it did not end in.
     has("Lathe 7 (A)|late|2026-10-24||1.0000|0.8333|0.8333|2.0000");
     assert!(rows.iter().all(|row| !row.contains("early|2026-10-26|2.0000") || row.starts_with("Mill 2")), "{rows:#?}");
-    // Whatever the time zone of whoever asks: half an hour off whole hours, behind and ahead of UTC.
-    for zone in ["UTC", "Asia/Kolkata", "America/New_York", "Asia/Shanghai"] {
+    // Whatever the time zone of whoever asks: behind UTC, and ahead of it by half an hour beside whole ones.
+    for zone in ["America/New_York", "Asia/Kolkata"] {
         plant.postgres.sql(&format!("ALTER DATABASE postgres SET timezone TO '{zone}'"));
         assert_eq!(ask(&plant, "oee-per-shift"), rows, "{zone}");
         every_other_question(&plant, zone);
