@@ -47,9 +47,9 @@ impl Ending {
 /// The outcome of a request.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RequestOutcome {
-    /// Who has asked.
+    /// Who has asked, as the message says.
     pub origin: RequestOrigin,
-    /// How it ended.
+    /// How it ended, in one word.
     pub ending: Ending,
     /// Why, as a word for programs; empty where the ending says all.
     pub why: &'static str,

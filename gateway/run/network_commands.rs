@@ -75,7 +75,7 @@ impl Commands {
         self.tell_settled(settled, pipeline.gate_mut(), health);
     }
 
-    /// The box ends.
+    /// The box ends: what is not known yet will not be known.
     pub(super) fn close_requests(&mut self, at_ns: TimeNs, gate: &mut Gate, health: &mut Health) {
         let ended = self.network.close_requests(at_ns);
         self.tell_settled(ended, gate, health);

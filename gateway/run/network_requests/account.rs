@@ -10,7 +10,7 @@ pub(super) const REASON_MAX: usize = 600;
 /// What is answered to a request, and how it ended where that is known already, with the word of the reason.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RequestJudgement {
-    /// The answer.
+    /// What is answered at once.
     pub reply: Reply,
     /// How it ended, and why; `None`: the control has to show it.
     pub ending: Option<(Ending, &'static str)>,

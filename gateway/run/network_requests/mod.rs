@@ -183,14 +183,14 @@ mod tests {
     }
 
     /// The requests with the way back to the askers.
-    struct Desk {
+    struct Askers {
         requests: NetworkRequests,
         outcomes: OutcomeSender,
         told: Receiver<RequestOutcome>,
         rows: Vec<Audit>,
     }
 
-    impl Desk {
+    impl Askers {
         fn new() -> Self {
             let (outcomes, told) = channel(OUTCOMES_MAX);
             Self { requests: NetworkRequests::default(), outcomes, told, rows: Vec::new() }
@@ -249,93 +249,98 @@ mod tests {
 
     #[test]
     fn a_request_stands_for_a_minute_and_the_least_counts() {
-        let mut desk = Desk::new();
-        desk.ask("plan", "a", &change(80.0), None, 0);
-        desk.ask("cell", "b", &change(60.0), None, 10);
-        let pct = |desk: &mut Desk, at_s: i64| desk.requests.find_least_override(at_s * SECOND_NS).map(|it| it.pct);
-        assert_eq!(pct(&mut desk, 11), Some(60.0));
-        desk.ask("cell", "c", &RequestedChange::Withdraw, None, 12);
-        assert_eq!(pct(&mut desk, 12), Some(80.0));
-        desk.ask("plan", "d", &change(90.0), None, 50);
-        assert_eq!(pct(&mut desk, 109), Some(90.0), "asked again");
-        assert_eq!(pct(&mut desk, 110), None);
-        desk.ask("plan", "e", &change(90.0), None, 200);
-        assert_eq!(pct(&mut desk, 100), None, "a clock that went back");
-        assert_eq!(desk.told(), ["b replaced  -", "a replaced  -", "d replaced  -"]);
+        let mut askers = Askers::new();
+        askers.ask("plan", "a", &change(80.0), None, 0);
+        askers.ask("cell", "b", &change(60.0), None, 10);
+        let pct =
+            |askers: &mut Askers, at_s: i64| askers.requests.find_least_override(at_s * SECOND_NS).map(|it| it.pct);
+        assert_eq!(pct(&mut askers, 11), Some(60.0));
+        askers.ask("cell", "c", &RequestedChange::Withdraw, None, 12);
+        assert_eq!(pct(&mut askers, 12), Some(80.0));
+        askers.ask("plan", "d", &change(90.0), None, 50);
+        assert_eq!(pct(&mut askers, 109), Some(90.0), "asked again");
+        assert_eq!(pct(&mut askers, 110), None);
+        askers.ask("plan", "e", &change(90.0), None, 200);
+        assert_eq!(pct(&mut askers, 100), None, "a clock that went back");
+        assert_eq!(askers.told(), ["b replaced  -", "a replaced  -", "d replaced  -"]);
     }
 
     #[test]
     fn while_nothing_is_written_it_is_not_done_and_never_written_later() {
-        let mut desk = Desk::new();
+        let mut askers = Askers::new();
         for change in [change(80.0), RequestedChange::Withdraw, change(70.0)] {
-            let judgement = desk.ask("mes", "a", &change, Some(Disarmed::Start), 0);
+            let judgement = askers.ask("mes", "a", &change, Some(Disarmed::Start), 0);
             assert!(
                 !judgement.reply.done && judgement.reply.text.contains("not armed since the start"),
                 "{judgement:?}"
             );
             assert_eq!(judgement.ending, Some((Ending::NotWritten, "start")));
         }
-        assert_eq!(desk.requests.find_least_override(1).map(|it| it.pct), Some(70.0), "the gate sees it all the same");
-        assert!(desk.requests.end_requests(Disarmed::Start, 2).is_empty(), "its outcome was told");
-        assert_eq!(desk.requests.find_least_override(3), None, "whoever arms now lets nothing of before pass");
+        assert_eq!(
+            askers.requests.find_least_override(1).map(|it| it.pct),
+            Some(70.0),
+            "the gate sees it all the same"
+        );
+        assert!(askers.requests.end_requests(Disarmed::Start, 2).is_empty(), "its outcome was told");
+        assert_eq!(askers.requests.find_least_override(3), None, "whoever arms now lets nothing of before pass");
     }
 
     #[test]
     fn the_control_says_what_became_of_it() {
-        let mut desk = Desk::new();
-        desk.ask("mes", "a", &change(80.0), None, 0);
+        let mut askers = Askers::new();
+        askers.ask("mes", "a", &change(80.0), None, 0);
         let wanted = verdict(1, Some(80.0), 90, GateOutcome::Limited(Bound::Slew));
-        assert!(desk.tick(GateSituation { ramping: true, ..situation(&wanted, shows(90)) }).is_empty(), "on its way");
+        assert!(askers.tick(GateSituation { ramping: true, ..situation(&wanted, shows(90)) }).is_empty(), "on its way");
         let wanted = verdict(2, Some(80.0), 80, GateOutcome::Permitted);
-        assert!(desk.tick(situation(&wanted, ControlState::AtDial)).is_empty());
-        assert!(desk.tick(situation(&wanted, ControlState::Written)).is_empty());
-        assert_eq!(desk.tick(situation(&wanted, shows(80))), ["a followed  80"]);
-        assert!(desk.tick(situation(&wanted, shows(80))).is_empty(), "once");
-        desk.ask("mes", "b", &change(20.0), None, 3);
+        assert!(askers.tick(situation(&wanted, ControlState::AtDial)).is_empty());
+        assert!(askers.tick(situation(&wanted, ControlState::Written)).is_empty());
+        assert_eq!(askers.tick(situation(&wanted, shows(80))), ["a followed  80"]);
+        assert!(askers.tick(situation(&wanted, shows(80))).is_empty(), "once");
+        askers.ask("mes", "b", &change(20.0), None, 3);
         let least = verdict(4, Some(20.0), 50, GateOutcome::Limited(Bound::Least));
-        assert_eq!(desk.tick(situation(&least, shows(50))), ["b limited limited 50"]);
-        desk.ask("mes", "c", &RequestedChange::Withdraw, None, 5);
+        assert_eq!(askers.tick(situation(&least, shows(50))), ["b limited limited 50"]);
+        askers.ask("mes", "c", &RequestedChange::Withdraw, None, 5);
         let nothing = verdict(6, None, 100, GateOutcome::Permitted);
-        assert!(desk.tick(situation(&nothing, shows(50))).is_empty(), "it is still in force");
-        assert_eq!(desk.tick(situation(&nothing, ControlState::AtDial)), ["c followed  -"]);
-        let outcomes: Vec<&str> = desk.rows.iter().map(|row| row.outcome.as_str()).collect();
+        assert!(askers.tick(situation(&nothing, shows(50))).is_empty(), "it is still in force");
+        assert_eq!(askers.tick(situation(&nothing, ControlState::AtDial)), ["c followed  -"]);
+        let outcomes: Vec<&str> = askers.rows.iter().map(|row| row.outcome.as_str()).collect();
         assert_eq!(outcomes, ["followed", "limited", "followed"]);
-        assert_eq!((desk.rows[1].asked, desk.rows[1].after), (Some(20.0), Some(50.0)));
+        assert_eq!((askers.rows[1].asked, askers.rows[1].after), (Some(20.0), Some(50.0)));
         assert!(
-            desk.rows[1].reason.starts_with("asked by \"mes\", id \"b\"; the control shows 50 %"),
+            askers.rows[1].reason.starts_with("asked by \"mes\", id \"b\"; the control shows 50 %"),
             "{:?}",
-            desk.rows[1]
+            askers.rows[1]
         );
     }
 
     #[test]
     fn two_askers_are_told_each_what_became_of_his_own() {
-        let mut desk = Desk::new();
-        desk.ask("mes", "m", &change(80.0), None, 0);
-        desk.ask("cell", "c", &change(60.0), None, 0);
+        let mut askers = Askers::new();
+        askers.ask("mes", "m", &change(80.0), None, 0);
+        askers.ask("cell", "c", &change(60.0), None, 0);
         let wanted = verdict(1, Some(60.0), 60, GateOutcome::Permitted);
-        let told = desk.tick(situation(&wanted, shows(60)));
+        let told = askers.tick(situation(&wanted, shows(60)));
         assert_eq!(told, ["m limited less_is_asked_for 60", "c followed  60"]);
-        desk.ask("cell", "w", &RequestedChange::Withdraw, None, 2);
+        askers.ask("cell", "w", &RequestedChange::Withdraw, None, 2);
         let wanted = verdict(3, Some(80.0), 80, GateOutcome::Permitted);
-        assert_eq!(desk.tick(situation(&wanted, shows(80))), ["w limited less_is_asked_for 80"]);
+        assert_eq!(askers.tick(situation(&wanted, shows(80))), ["w limited less_is_asked_for 80"]);
     }
 
     #[test]
     fn what_the_control_does_not_show_is_told_when_its_time_is_over_or_the_arming_is() {
-        let mut desk = Desk::new();
-        desk.ask("mes", "held", &change(80.0), None, 0);
-        desk.ask("cell", "lost", &change(70.0), None, 30);
+        let mut askers = Askers::new();
+        askers.ask("mes", "held", &change(80.0), None, 0);
+        askers.ask("cell", "lost", &change(70.0), None, 30);
         let held = verdict(59, Some(70.0), 100, GateOutcome::Held(Hold::Off));
-        assert!(desk.tick(situation(&held, ControlState::AtDial)).is_empty());
+        assert!(askers.tick(situation(&held, ControlState::AtDial)).is_empty());
         let held = verdict(60, Some(70.0), 100, GateOutcome::Held(Hold::Off));
-        assert_eq!(desk.tick(situation(&held, ControlState::AtDial)), ["held not_followed held -"]);
+        assert_eq!(askers.tick(situation(&held, ControlState::AtDial)), ["held not_followed held -"]);
         let disarmed = GateSituation { unarmed: Some(Disarmed::ReadBack), ..situation(&held, ControlState::AtDial) };
-        assert_eq!(desk.tick(disarmed), ["lost failed read_back -"]);
-        desk.ask("mes", "end", &change(80.0), None, 61);
-        let ended = desk.requests.close_requests(62 * SECOND_NS);
-        desk.keep(ended);
-        assert_eq!(desk.told(), ["end not_followed stopped -"]);
+        assert_eq!(askers.tick(disarmed), ["lost failed read_back -"]);
+        askers.ask("mes", "end", &change(80.0), None, 61);
+        let ended = askers.requests.close_requests(62 * SECOND_NS);
+        askers.keep(ended);
+        assert_eq!(askers.told(), ["end not_followed stopped -"]);
     }
 
     #[test]

@@ -15,7 +15,7 @@ pub enum ControlState {
     AtDial,
     /// Written, and not seen in force yet.
     Written,
-    /// Seen in force.
+    /// Seen in force by the writer.
     Shows(Reaction),
 }
 

@@ -34,7 +34,7 @@ const CONFIRMED_MAX: usize = 4096;
 /// How grave an alarm is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum AlarmSeverity {
-    /// Worth knowing.
+    /// It is worth knowing.
     Info,
     /// Somebody has to look.
     Warning,
