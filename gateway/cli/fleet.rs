@@ -90,9 +90,10 @@ pub(super) struct StreamArguments {
     /// How long messages are kept, days.
     #[arg(long, default_value_t = 7, value_name = "DAYS", value_parser = clap::value_parser!(u32).range(1..=3660))]
     max_age_d: u32,
-    /// Greatest size on each server, GB; beyond it new messages are refused and wait in the boxes.
-    #[arg(long, default_value_t = 10.0, value_name = "GB")]
-    max_gb: f64,
+    /// Greatest size on each server, GB; beyond it new messages are refused and wait in the boxes. Without it 10, or less where the servers
+    /// have no room for that.
+    #[arg(long, value_name = "GB")]
+    max_gb: Option<f64>,
 }
 
 /// From the stream into the database.
@@ -110,6 +111,8 @@ pub(super) struct IngestArguments {
     once: bool,
 }
 
+/// Size of a stream where nobody says one, GB: a week of some ten machines.
+const STREAM_GB: f64 = 10.0;
 /// A second copy of a message within this time is not stored a second time; PostgreSQL recognises later ones.
 const DUPLICATE_WINDOW: Duration = Duration::from_secs(120);
 
@@ -123,7 +126,8 @@ impl StreamArguments {
                 "use letters, digits, - and _",
             ));
         }
-        if !(self.max_gb > 0.0 && self.max_gb <= 1e6) {
+        let max_gb = self.max_gb.unwrap_or(STREAM_GB);
+        if !(max_gb > 0.0 && max_gb <= 1e6) {
             return Err(CannotRun::new("--max-gb is out of range", "give a size above 0"));
         }
         #[expect(
@@ -131,13 +135,14 @@ impl StreamArguments {
             clippy::cast_sign_loss,
             reason = "within the range that was checked"
         )]
-        let max_bytes = (self.max_gb * 1e9) as u64;
+        let max_bytes = (max_gb * 1e9) as u64;
         let settings = StreamSettings {
             name: self.stream.clone(),
             subjects: format!("{prefix}.>"),
             replicas: self.replicas,
             max_age: Duration::from_secs(86_400 * u64::from(self.max_age_d)),
             max_bytes,
+            may_shrink: self.max_gb.is_none(),
             duplicate_window: DUPLICATE_WINDOW,
         };
         Ok((servers, settings))
@@ -197,8 +202,11 @@ async fn create_stream(arguments: &StreamArguments) -> CommandResult {
     let (messages, bytes) = connection.stream_size(&settings.name).await?;
     let StreamSettings { name, subjects, replicas, .. } = &settings;
     print_text(&match created {
-        true => format!("stream {name} created for {subjects}, on {replicas} server(s)\n"),
-        false => format!("stream {name} is there: {messages} messages, {:.1} MB\n", bytes as f64 / 1e6),
+        Some(most) => format!(
+            "stream {name} created for {subjects}, on {replicas} server(s), at most {:.1} GB on each\n",
+            most as f64 / 1e9
+        ),
+        None => format!("stream {name} is there: {messages} messages, {:.1} MB\n", bytes as f64 / 1e6),
     });
     Ok(CommandOutcome::Fine)
 }

@@ -92,6 +92,14 @@ pub enum RequestRefusal {
         /// Name of the metric at the broker.
         metric: String,
     },
+    /// A command that asks for more than is looked at.
+    #[error("a command of {count} metrics asks for too much at once: at most {most} are looked at")]
+    TooMany {
+        /// Metrics of the command that are requests.
+        count: usize,
+        /// As many are looked at.
+        most: usize,
+    },
     /// A metric that must be a number.
     #[error("{metric} is no number")]
     NoNumber {
@@ -104,6 +112,27 @@ pub enum RequestRefusal {
         /// Name of the metric at the broker.
         metric: &'static str,
     },
+}
+
+impl RequestRefusal {
+    /// The word for programs: several refusals of one kind have the same.
+    #[must_use]
+    pub fn as_word(&self) -> &'static str {
+        match self {
+            Self::NotAllowedPct { .. } | Self::NotWritable { .. } => "not_allowed",
+            Self::ClosedSink { .. } => "closed",
+            Self::TooLong { .. }
+            | Self::Unreadable { .. }
+            | Self::Unknown { .. }
+            | Self::TooMany { .. }
+            | Self::NoNumber { .. }
+            | Self::NoText { .. } => "malformed",
+            Self::RetainedMessage | Self::RetainedCommand => "retained",
+            Self::WithoutOrigin => "without_origin",
+            Self::NotFresh { .. } | Self::BeforeStart => "expired",
+            Self::Repeated { .. } => "replayed",
+        }
+    }
 }
 
 /// What is asked for.

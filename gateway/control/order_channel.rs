@@ -3,10 +3,13 @@
 //! Orders, rows and requests of the network go by queues of their own: however many rows a flood of refused requests makes, an
 //! order to disarm finds its place. Neither waits for the next tick: the tick's thread is woken while it waits for that.
 
-use super::{ANSWER_WITHIN, NetworkRequest, Order, QueuedOrder, Reply, WAITING_MAX};
+use super::{
+    ANSWER_WITHIN, Ending, NetworkRequest, Order, OutcomeSender, QueuedOrder, Reply, RequestOutcome, WAITING_MAX,
+};
+use gateway_base::clock;
 use gateway_history::Audit;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, OnceLock};
 use std::thread::Thread;
 use std::time::Duration;
@@ -64,6 +67,8 @@ pub struct PostedRequest {
     pub request: NetworkRequest,
     /// Where the answer goes.
     pub reply: oneshot::Sender<Reply>,
+    /// Where the outcome goes, at once or later.
+    pub outcomes: OutcomeSender,
 }
 
 /// The end of those who order.
@@ -115,12 +120,13 @@ impl OrderSender {
         }
     }
 
-    /// Hands a request of the network to the tick and gives what it says. The tick is not woken for it: a request counts from
-    /// the next tick on.
-    pub async fn send_request(&self, request: NetworkRequest) -> Reply {
+    /// Hands a request of the network to the tick and gives what it says; the outcome goes to `outcomes`. The tick is not woken for
+    /// it: a request counts from the next tick on.
+    pub async fn send_request(&self, request: NetworkRequest, outcomes: &OutcomeSender) -> Reply {
         let (reply, answered) = oneshot::channel();
-        if self.requests.try_send(PostedRequest { request, reply }).is_err() {
-            return Reply::from_refusal("too many requests wait for the gate; ask again later");
+        let posted = PostedRequest { request, reply, outcomes: outcomes.clone() };
+        if let Err(TrySendError::Full(posted) | TrySendError::Disconnected(posted)) = self.requests.try_send(posted) {
+            return refuse_busy(posted);
         }
         match tokio::time::timeout(ACCOUNT_WITHIN, answered).await {
             Ok(Ok(reply)) => reply,
@@ -137,4 +143,21 @@ impl OrderSender {
         self.wake.wake_thread();
         matches!(tokio::time::timeout(ACCOUNT_WITHIN, answered).await, Ok(Ok(true)))
     }
+}
+
+/// The tick takes nothing more: it will neither answer nor tell an outcome.
+fn refuse_busy(posted: PostedRequest) -> Reply {
+    let text = "too many requests wait for the gate; ask again later";
+    let outcome = RequestOutcome {
+        origin: posted.request.origin,
+        ending: Ending::Refused,
+        why: "busy",
+        text: text.to_owned(),
+        asked_pct: None,
+        in_force_pct: None,
+        at_ns: clock::now_ns(),
+    };
+    // Where the sink does not fetch outcomes there is nobody to tell.
+    let _full = posted.outcomes.try_send(outcome);
+    Reply::from_refusal(text)
 }

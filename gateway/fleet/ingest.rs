@@ -96,8 +96,9 @@ impl Ingest<'_> {
         self.server += 1;
         let mut database = Database::open(database).await?;
         let mut connection = Connection::open(servers, first, "cnc-gateway fleet ingest").await?;
-        if connection.create_stream(stream).await? {
-            let text = format!("stream {} created for {}", stream.name, stream.subjects);
+        if let Some(bytes) = connection.create_stream(stream).await? {
+            let text =
+                format!("stream {} created for {}, at most {:.1} GB", stream.name, stream.subjects, bytes as f64 / 1e9);
             Notice::new(Severity::Info, "stream_created", text).write_to_logs();
         }
         connection.create_consumer(&stream.name, consumer).await?;
@@ -112,8 +113,10 @@ impl Ingest<'_> {
             self.count_written(written?);
             connection.acknowledge_messages(&batch);
             connection.flush().await?;
-            batch = fetched?;
-            if let Some(last_number) = last_number {
+            let fetched = fetched?;
+            let looks = last_number.filter(|number| [&batch, &fetched].into_iter().any(|of| may_be_last(of, *number)));
+            batch = fetched;
+            if let Some(last_number) = looks {
                 let backlog = connection.read_backlog(&stream.name, consumer).await?;
                 let nothing_left = batch.is_empty() && backlog.pending == 0 && backlog.under_way == 0;
                 if nothing_left || backlog.acknowledged_to >= last_number {
@@ -149,6 +152,14 @@ impl Ingest<'_> {
             format!("{new} rows written, {known} known already, {refused} refused; {pending} wait in the stream");
         Notice::new(Severity::Info, "ingest", text).write_to_logs();
     }
+}
+
+/// Is it worth asking the stream whether everything up to this number is done? Not before something from there on has come, or nothing.
+fn may_be_last(batch: &[Message], last_number: u64) -> bool {
+    let reached = |message: &Message| {
+        message.stream_sequence().and_then(|number| u64::try_from(number).ok()) >= Some(last_number)
+    };
+    batch.is_empty() || batch.iter().any(reached)
 }
 
 /// What became of a batch.

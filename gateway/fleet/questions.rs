@@ -19,6 +19,7 @@ macro_rules! questions {
 
 questions! {
     "mean-by-machine" => "mean_by_machine",
+    "power-while-cutting" => "power_while_cutting",
     "series-over-machines" => "series_over_machines",
     "machines-now" => "machines_now",
     "states-by-machine" => "states_by_machine",

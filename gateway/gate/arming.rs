@@ -41,6 +41,8 @@ pub enum Disarmed {
     NoAudit,
     /// A thread of the gateway broke off.
     Thread,
+    /// The configuration lets no override be written.
+    Mode,
 }
 
 impl Disarmed {
@@ -58,6 +60,7 @@ impl Disarmed {
             Self::Silent => "silent",
             Self::NoAudit => "no_audit",
             Self::Thread => "thread",
+            Self::Mode => "mode",
         }
     }
 }
@@ -74,6 +77,7 @@ impl fmt::Display for Disarmed {
             Self::Clock => "the clock of the box was set",
             Self::NoAudit => "the history takes nothing, so nothing can be accounted for",
             Self::Thread => "a thread of the gateway broke off",
+            Self::Mode => "`mode` under [gate] is not \"armed\"",
             Self::Silent => "no fresh values from the machine for ten seconds",
         })
     }

@@ -65,6 +65,8 @@ pub struct Gate {
     aim: Aim,
     slew: Slew,
     arming: Arming,
+    /// Does the last verdict stand between what was let through before and what will be?
+    ramping: bool,
     /// Was the last verdict one that may be written?
     wrote: bool,
     /// An arming has ended since the last verdict.
@@ -83,6 +85,7 @@ impl Gate {
             aim: Aim::new(limits.dead_band_pct),
             slew: Slew::new(limits.slew_up_pct_per_s, limits.slew_down_pct_per_s),
             arming: Arming::new(limits.greatest_mode(), limits.armed_for),
+            ramping: false,
             wrote: false,
             ended: false,
             asks: Asks::new(),
@@ -173,6 +176,7 @@ impl Gate {
             }
         };
         let moves = hold.is_none() && bound.is_none() && !matches!(outcome, GateOutcome::DialCounts(_));
+        self.ramping = hold.is_none() && (self.slew.exact_pct() - target_pct).abs() >= 0.5;
         let slewing = moves && (self.slew.exact_pct() - target_pct).abs() >= 1.0;
         let outcome = if slewing { GateOutcome::Limited(Bound::Slew) } else { outcome };
         // The wall between scripts and machine: whatever was asked for, what passes lies between 100 % and the band.
@@ -184,6 +188,12 @@ impl Gate {
         Verdict { at_ns, wanted_pct, permitted, outcome, armed }
     }
 
+    /// Is the override that was let through last on its way to another, step by step?
+    #[must_use]
+    pub fn is_ramping(&self) -> bool {
+        self.ramping
+    }
+
     /// Judges what scripts ask of the ladder at this tick, after [`Gate::decide_override`]: each request passes once, and then not
     /// before it has been withdrawn and the operator has seen to the last one. Gives those that are new.
     pub fn judge_requests(&mut self, asks: &[ScriptRequest], sample: &Sample) -> Vec<(ScriptRequest, AskOutcome)> {
@@ -191,9 +201,16 @@ impl Gate {
         self.asks.judge_requests(asks, sample, armed)
     }
 
-    /// Armed, and for overrides: the arming may be there for offsets only.
+    /// Who armed the gate, while it writes overrides: an arming may be there for offsets only.
+    ///
+    /// # Errors
+    /// Why none is written.
+    pub fn override_arming(&self) -> Result<&Armed, Disarmed> {
+        if self.limits.mode == GateMode::Armed { self.arming.state() } else { Err(Disarmed::Mode) }
+    }
+
     fn writes_override(&self) -> bool {
-        self.limits.mode == GateMode::Armed && self.arming.state().is_ok()
+        self.override_arming().is_ok()
     }
 
     /// Judges the offsets that are proposed at this tick, after [`Gate::decide_override`]. Nothing while `[gate.offset]` is off.

@@ -225,6 +225,13 @@ fn write_machine(page: &mut Page, status: &Status) {
         seconds,
     );
     page.write_counter("cncgw_parts_total", "Parts finished since the start", status.parts);
+    let energies = status.energies.iter().map(|energy| (format_label("channel", energy.channel), energy.joules));
+    page.write_family(
+        "cncgw_energy_joules_total",
+        "counter",
+        "Energy drawn since the start, by the power it is counted from",
+        energies,
+    );
     page.write_gauge("cncgw_alarms", "Alarms that stand", status.alarms.len() as f64);
     page.write_gauge(
         "cncgw_gate_armed",

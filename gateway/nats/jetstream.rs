@@ -45,6 +45,11 @@ pub enum JetStreamFailure {
     Message(NatsError),
 }
 
+/// What JetStream answers where a stream is larger than its storage: of the server, of the account.
+const NO_ROOM: [u64; 2] = [10047, 10028];
+/// A stream that takes less is of no use: some hours of one machine.
+const STREAM_BYTES_MIN: u64 = 100_000_000;
+
 /// How a stream is created.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StreamSettings {
@@ -58,6 +63,8 @@ pub struct StreamSettings {
     pub max_age: Duration,
     /// Greatest size, bytes. Beyond it new messages are refused, and the boxes keep them.
     pub max_bytes: u64,
+    /// Where the servers have no room for that much: half of it, as often as it takes. Otherwise it is an error.
+    pub may_shrink: bool,
     /// A second message with the same id within this time is not stored.
     pub duplicate_window: Duration,
 }
@@ -174,20 +181,32 @@ impl Connection {
     ///
     /// # Errors
     /// What JetStream says.
-    pub async fn create_stream(&mut self, settings: &StreamSettings) -> Result<bool, NatsError> {
+    pub async fn create_stream(&mut self, settings: &StreamSettings) -> Result<Option<u64>, NatsError> {
         let name = &settings.name;
         match self.call_api(&format!("STREAM.INFO.{name}"), &json!({})).await? {
-            Ok(_exists) => return Ok(false),
+            Ok(_exists) => return Ok(None),
             Err((10059, _not_found)) => {}
             Err((code, said)) => return Err(words::of_jetstream(code, &said)),
         }
-        let request = json!({
+        let mut request = json!({
             "name": name, "subjects": [settings.subjects], "retention": "limits", "storage": "file", "discard": "new",
             "num_replicas": settings.replicas, "max_age": duration_to_unsigned_ns(settings.max_age), "max_bytes": settings.max_bytes,
             "duplicate_window": duration_to_unsigned_ns(settings.duplicate_window.min(settings.max_age)),
             "max_msgs": -1, "max_consumers": -1, "max_msg_size": -1,
         });
-        self.call_api_or_fail(&format!("STREAM.CREATE.{name}"), &request).await.map(|_created| true)
+        let mut max_bytes = settings.max_bytes;
+        loop {
+            match self.call_api(&format!("STREAM.CREATE.{name}"), &request).await? {
+                Ok(_created) => return Ok(Some(max_bytes)),
+                Err((code, _))
+                    if NO_ROOM.contains(&code) && settings.may_shrink && max_bytes >= 2 * STREAM_BYTES_MIN =>
+                {
+                    max_bytes /= 2;
+                    request["max_bytes"] = json!(max_bytes);
+                }
+                Err((code, said)) => return Err(words::of_jetstream(code, &said)),
+            }
+        }
     }
 
     /// Messages and bytes in a stream.

@@ -4,30 +4,27 @@
 use super::acknowledged_alarms::AcknowledgedAlarms;
 use super::actuator_worker::{ActuatorReport, ActuatorWorker};
 use super::health::Health;
-use super::network_requests::{self, NetworkRequests};
+use super::network_requests::{ControlState, NetworkRequests};
 use super::offset_commands::{self, OffsetCommands};
 use super::report::to_milliseconds;
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{ChannelId, Sample};
 use gateway_base::log::{Notice, Severity};
 use gateway_config::{self as config, GateMode};
-use gateway_control::{
-    self as control, NetworkRequest, OrderReceiver, PostedRequest, PostedRow, QueuedOrder, Reply, RequestedChange,
-};
+use gateway_control::{self as control, OrderReceiver, PostedRow, QueuedOrder, Reply};
 use gateway_gate::offset::{Moved, OffsetOrder};
 use gateway_gate::{ArmError, Armed, AskOutcome, Disarmed, Fault, Gate, Occasion, ScriptRequest, Verdict, audit};
 use gateway_history::{Alarm, AlarmClear, Audit, ReactionTime};
 use gateway_pipeline::Pipeline;
 use gateway_status::{Acknowledged, AlarmStatus, StatusProblem};
 use rules::estimators::StateBasis;
-use rules::script::OverrideRequest;
 use std::time::Duration;
 
 /// Who raises the alarm.
 const SOURCE: &str = "gate";
 const CODE: &str = "gate_disarmed";
 /// Rows of the page that are accounted for at a time, and requests of the network.
-const ROWS_AT_ONCE_MAX: usize = 32;
+pub(super) const ROWS_AT_ONCE_MAX: usize = 32;
 
 /// The way from the gate's verdict to the machine, and back into history and audit.
 pub struct Commands {
@@ -35,9 +32,11 @@ pub struct Commands {
     offset_commands: OffsetCommands,
     /// Name of the source that is written to.
     target: String,
-    orders: OrderReceiver,
+    pub(super) orders: OrderReceiver,
     acknowledged_alarms: AcknowledgedAlarms,
-    network: NetworkRequests,
+    pub(super) network: NetworkRequests,
+    /// The override at the control.
+    pub(super) control: ControlState,
     trail: audit::Trail,
     /// Who armed it last.
     by: String,
@@ -65,6 +64,7 @@ impl Commands {
             orders: inbox,
             acknowledged_alarms: AcknowledgedAlarms::default(),
             network: NetworkRequests::default(),
+            control: ControlState::default(),
             trail: audit::Trail::default(),
             by: String::new(),
             was_armed: false,
@@ -113,43 +113,11 @@ impl Commands {
         }
     }
 
-    /// What the network has asked for meanwhile: judged like the request of a script, or refused; a row of the audit each.
-    fn hear_network(&mut self, gate: &mut Gate, at_ns: TimeNs, health: &mut Health) {
-        for _ in 0..ROWS_AT_ONCE_MAX {
-            let Ok(PostedRequest { request, reply }) = self.orders.requests.try_recv() else { return };
-            let answer = match health.is_storing() {
-                true => self.grant_request(&request, gate, at_ns),
-                false => Reply::from_refusal(ArmError::NoAudit.to_string()),
-            };
-            self.record_audit(network_requests::build_audit_row(&request, &answer, at_ns), gate, health);
-            let _gone = reply.send(answer);
-        }
-    }
-
-    fn grant_request(&mut self, request: &NetworkRequest, gate: &Gate, at_ns: TimeNs) -> Reply {
-        let NetworkRequest { sink, change, .. } = request;
-        match change {
-            Ok(RequestedChange::AcknowledgeAlarm { code }) => {
-                self.acknowledge_alarm(code, &network_requests::format_author(sink), at_ns)
-            }
-            Ok(change) => {
-                let unarmed = gate.current_arming().err().map(|why| why.to_string());
-                self.network.accept_change(sink, change, unarmed.as_deref(), at_ns)
-            }
-            Err(why) => Reply::from_refusal(why.to_string()),
-        }
-    }
-
-    fn acknowledge_alarm(&mut self, code: &str, by: &str, at_ns: TimeNs) -> Reply {
+    pub(super) fn acknowledge_alarm(&mut self, code: &str, by: &str, at_ns: TimeNs) -> Reply {
         match self.acknowledged_alarms.acknowledge_alarm(code, by, at_ns) {
             true => Reply::from_success(format!("the alarm {code} was seen; it stands until its reason has gone")),
             false => Reply::from_refusal(format!("no alarm {code:?} stands")),
         }
-    }
-
-    /// The feed override that the network asks for at this tick.
-    pub fn network_override(&mut self, at_ns: TimeNs) -> Option<OverrideRequest> {
-        self.network.find_least_override(at_ns)
     }
 
     fn run_order(&mut self, order: &control::Order, gate: &mut Gate, sample: &Sample, health: &mut Health) -> Reply {
@@ -188,6 +156,7 @@ impl Commands {
     fn arm(&mut self, by: &str, for_s: Option<f64>, gate: &mut Gate, sample: &Sample, health: &mut Health) -> Reply {
         let at_ns = sample.at_ns;
         let lasts = for_s.map(|seconds| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::ZERO));
+        self.end_unarmed_requests(gate, at_ns, health);
         let armed = match health.is_storing() {
             true => gate.arm(by, lasts, at_ns).cloned(),
             false => Err(ArmError::NoAudit),
@@ -212,7 +181,7 @@ impl Commands {
     }
 
     /// What cannot be accounted for is not written.
-    fn record_audit(&self, row: Audit, gate: &mut Gate, health: &mut Health) {
+    pub(super) fn record_audit(&self, row: Audit, gate: &mut Gate, health: &mut Health) {
         if !health.append_audit(row) {
             gate.disarm(Disarmed::NoAudit);
         }
@@ -246,6 +215,7 @@ impl Commands {
         self.accept_reports(said, sample, gate, health);
         self.apply_offsets(pipeline, sample, now_ns, health);
         self.follow_arming(pipeline.gate_mut(), sample.at_ns, health);
+        self.settle_requests(pipeline, &verdict, health);
     }
 
     /// Offsets: into the audit first, then to the machine.
@@ -283,6 +253,7 @@ impl Commands {
     fn accept_report(&mut self, said: ActuatorReport, sample: &Sample, gate: &mut Gate, health: &mut Health) {
         match said {
             ActuatorReport::Written(written) => {
+                self.control = self.control.after_write(&written);
                 let asks = matches!(written.occasion, Occasion::Change | Occasion::SignOfLife);
                 self.written = asks.then(|| f64::from(written.asked.percent()));
                 self.trail.write(&written).into_iter().for_each(|row| self.record_audit(row, gate, health));
@@ -291,6 +262,7 @@ impl Commands {
                 written.fault.into_iter().for_each(|fault| self.raise_fault(&fault, sample.at_ns, gate, health));
             }
             ActuatorReport::Seen(reaction) => {
+                self.control = ControlState::Shows(reaction);
                 self.record_audit(audit::audit_reaction(&reaction), gate, health);
                 let [program, block, tool] =
                     self.place.map(|id| id.and_then(|id| sample.text(id)).unwrap_or_default().to_owned());
@@ -354,6 +326,7 @@ impl Commands {
         self.actuator_worker.order_shifts(&orders, false, sample.at_ns, |it| said.push(it));
         self.actuator_worker.close(|it| said.push(it));
         self.accept_reports(said, sample, gate, health);
+        self.close_requests(sample.at_ns, gate, health);
         // What the page has asked to be noted just before the end is noted too.
         self.store_posted_rows(sample.at_ns, health);
     }

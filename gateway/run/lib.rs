@@ -5,9 +5,11 @@ pub mod actuator_worker;
 pub mod command;
 pub mod deadline;
 mod end;
+pub mod energy;
 pub mod health;
 pub mod history_store;
 pub mod live_twin;
+mod network_commands;
 pub mod network_requests;
 pub mod offset_commands;
 pub mod operations;
@@ -34,6 +36,7 @@ use crate::operations::Operations;
 use crate::signals::Signals;
 use adapters::clock::{Clock, SECOND_NS, TimeNs};
 use deadline::{RUN_MAX, RunLimit};
+use energy::EnergyCounter;
 use gateway_access::{self as access, Access};
 use gateway_backup::{BackupPaths, BackupSchedule, take_restored};
 use gateway_base::cannot_run::CannotRun;
@@ -282,6 +285,7 @@ fn build_ticker(
             feed,
             pipeline,
             commands,
+            energy: EnergyCounter::default(),
             machines,
             operations,
             twin,

@@ -1,6 +1,7 @@
 //! The tick thread: waits for the tick, samples, steps the pipeline, hands the status over.
 
 use super::command::Commands;
+use super::energy::EnergyCounter;
 use super::health::Health;
 use super::live_twin::Twin;
 use super::priority::{self, Granted};
@@ -78,6 +79,8 @@ pub struct Ticker {
     pub pipeline: Pipeline,
     /// Orders, audit, and the worker that writes.
     pub commands: Commands,
+    /// Energy since the start.
+    pub energy: EnergyCounter,
     /// The simulated machines, which count what is written to them.
     pub machines: Vec<Simulated>,
     /// How each stretch of a program cuts, where a recipe is configured.
@@ -129,6 +132,7 @@ impl Ticker {
             reach_fault_point("tick");
             let began_ns = *first_ns.get_or_insert(now_ns);
             let alive = self.feed.sample_into(&mut sample, now_ns);
+            self.energy.count_tick(&sample);
             self.fill_from_recipe(&mut sample, now_ns);
             self.scripts.apply_changes(&mut self.pipeline, &mut self.health, &self.run_flags, (now_ns, sample.at_ns));
             if self.disarm_for_broken_threads(&sample) {
@@ -257,6 +261,7 @@ impl Ticker {
             acknowledged,
             twin: self.twin.as_ref().map(Twin::build_status),
             parts: self.pipeline.parts().finished_count(),
+            energies: self.energy.list_energies(),
             gate: report::build_gate_status(&self.pipeline, self.commands.written_pct()),
             sources: self.feed.list_sources(now_ns),
             alignment: self.feed.alignment().build_status(),

@@ -7,6 +7,7 @@ use super::opcua::OpcuaTarget;
 use super::parquet::ParquetTarget;
 use super::shdr::ShdrTarget;
 use super::sparkplug::SparkplugTarget;
+use super::webhook::WebhookTarget;
 use adapter_core::address::{self, AddressError, AddressProblem, Keys};
 use adapter_core::channel::find_nearest_name;
 use gateway_nats::ClusterAddressError;
@@ -15,7 +16,7 @@ use std::str::FromStr;
 use thiserror::Error;
 
 /// The schemes of the notation, each with how an address of it is written.
-pub const SCHEMES: [(&str, &str); 9] = [
+pub const SCHEMES: [(&str, &str); 11] = [
     ("mqtt", "mqtt://BROKER:1883/PREFIX"),
     ("mqtts", "mqtts://BROKER:8883/PREFIX"),
     ("nats", "nats://SERVER:4222,SERVER:4222/PREFIX"),
@@ -25,6 +26,8 @@ pub const SCHEMES: [(&str, &str); 9] = [
     ("sparkplug", "sparkplug://BROKER:1883/GROUP/NODE/DEVICE"),
     ("shdr", "shdr://0.0.0.0:7878"),
     ("sparkplugs", "sparkplugs://BROKER:8883/GROUP/NODE/DEVICE"),
+    ("webhook", "webhook://HOST:80/PATH?secret_file=FILE"),
+    ("webhooks", "webhooks://HOST:443/PATH?secret_file=FILE"),
 ];
 
 /// What an address means. Each variant belongs to one kind of sink.
@@ -43,6 +46,8 @@ pub enum SinkTarget {
     Shdr(ShdrTarget),
     /// Sparkplug B at an MQTT broker.
     Sparkplug(SparkplugTarget),
+    /// Alarms as HTTP requests.
+    Webhook(WebhookTarget),
 }
 
 /// Where a sink is, and how to talk to it.
@@ -76,6 +81,7 @@ impl SinkAddress {
             SinkTarget::Parquet(target) => target.find_file_problems(),
             SinkTarget::Shdr(_) => Vec::new(),
             SinkTarget::Sparkplug(target) => target.broker.find_file_problems(),
+            SinkTarget::Webhook(target) => target.find_file_problems(),
         }
     }
 
@@ -161,6 +167,12 @@ pub(super) enum TargetError {
     /// A name of Sparkplug that is none.
     #[error("{part:?} is no name of a group, node or device: leave out + and #")]
     NodeName { part: String },
+    /// What is posted to is none.
+    #[error("{path:?} is no path of an HTTP address; write %20 for a blank")]
+    Path { path: String },
+    /// Nobody could tell who has sent an alarm.
+    #[error("write secret_file=FILE: its first line is the secret that messages are signed with")]
+    NoSecret,
     /// A server that lets nobody in.
     #[cfg(feature = "opcua")]
     #[error("nobody could sign in: write user= and password_file=, or anonymous=yes")]
@@ -180,6 +192,7 @@ fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, Target
         "sparkplug" | "sparkplugs" => {
             SparkplugTarget::parse(body, keys, scheme == "sparkplugs").map(SinkTarget::Sparkplug)
         }
+        "webhook" | "webhooks" => WebhookTarget::parse(body, keys, scheme == "webhooks").map(SinkTarget::Webhook),
         _ => Err(TargetError::UnknownScheme { scheme: scheme.to_owned() }),
     }
 }

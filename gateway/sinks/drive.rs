@@ -4,7 +4,9 @@ use super::board::{Board, to_seconds};
 use super::isolation::{Isolation, Turn};
 use super::{Batch, Requests, Sink, SinkError, open_sink};
 use crate::sink_config::SinkConfig;
+use adapter_core::clock::TimeNs;
 use gateway_base::clock;
+use gateway_base::convert::clamp_to_unsigned;
 use gateway_base::log::{Notice, Severity};
 use gateway_control::OrderSender;
 use gateway_history::{Item, Outbox, OutboxHead, OutboxReader, OutboxStretch};
@@ -22,6 +24,8 @@ const PAUSE_MAX: Duration = Duration::from_secs(20);
 const DEADLINE: Duration = Duration::from_secs(60);
 /// How long a farewell may take.
 const FAREWELL: Duration = Duration::from_secs(2);
+/// While nothing is to be sent, it is looked at this often whether that is over.
+const HELD_LOOK_EVERY: Duration = Duration::from_secs(30);
 /// With more items than this waiting when the connection stands, the sink goes on with live data and fills the gap later;
 /// fewer are sent in their order. At ten items a second this is the delay of a second.
 const JUMP_ITEMS: u64 = 10;
@@ -195,6 +199,9 @@ impl SinkTask {
 
     /// One batch of live data, or else one of old data, or else waits for something to happen.
     async fn deliver_next(&mut self, sink: &mut dyn Sink, head: &mut watch::Receiver<OutboxHead>) -> Result<(), Left> {
+        if let Some(until_ns) = sink.held_until(clock::now_ns()) {
+            return self.wait_held(sink, until_ns).await;
+        }
         let newest = *head.borrow_and_update();
         let Some(standing) = self.outbox.delivery_state(&self.name) else { return Err(Left::Stop) };
         let next = standing.position.next();
@@ -210,6 +217,24 @@ impl SinkTask {
             _ = self.stopping.wait_for(|stop| *stop) => return Err(Left::Stop),
         };
         serve_within_deadline(sink, wanted).await
+    }
+
+    /// Nothing is to be sent now. The clock may be set meanwhile: it is looked at again before long.
+    async fn wait_held(&mut self, sink: &mut dyn Sink, until_ns: TimeNs) -> Result<(), Left> {
+        let left_ns = until_ns.saturating_sub(clock::now_ns());
+        let left = Duration::from_nanos(clamp_to_unsigned(left_ns)).min(HELD_LOOK_EVERY);
+        // Nobody who stops the box waits for a sink that sends nothing.
+        self.outbox.set_linked(&self.name, false);
+        let wanted = tokio::select! {
+            () = sleep(left) => Ok(None),
+            wanted = sink.wait_for_receiver() => Ok(Some(wanted)),
+            _ = self.stopping.wait_for(|stop| *stop) => Err(Left::Stop),
+        };
+        self.outbox.set_linked(&self.name, true);
+        match wanted? {
+            Some(wanted) => serve_within_deadline(sink, wanted).await,
+            None => Ok(()),
+        }
     }
 
     async fn deliver_batch(
@@ -239,7 +264,7 @@ impl SinkTask {
             }
             (_, Err(error @ SinkError::Item { sequence, .. })) => self.record_refusal(&error, from, sequence),
             (turn, Err(error)) => {
-                if self.isolation.record_break(turn, from, last) {
+                if !sink.tells_refusals() && self.isolation.record_break(turn, from, last) {
                     self.record_refusal(&breaks_line(from), from, from);
                 }
                 return Err(error.into());

@@ -34,6 +34,7 @@ pub mod shdr;
 pub mod sink_config;
 pub mod sparkplug;
 pub mod status;
+pub mod webhook;
 
 pub use address::{SinkAddress, SinkTarget};
 pub use board::Board;
@@ -43,6 +44,7 @@ pub use requests::Requests;
 pub use resend::Resender;
 pub use status::SinkStatus;
 
+use adapter_core::clock::TimeNs;
 use gateway_history::Item;
 use std::fmt;
 use std::pin::Pin;
@@ -95,6 +97,16 @@ pub trait Sink: Send {
     /// Can the receiver take old data after new data? Otherwise what an outage left is not sent, and counted as dropped.
     fn takes_history(&self) -> bool {
         true
+    }
+
+    /// Until when nothing is to be sent, where that is so now, ns since 1970. Everything waits in the outbox meanwhile.
+    fn held_until(&self, _now_ns: TimeNs) -> Option<TimeNs> {
+        None
+    }
+
+    /// Does the receiver always say which item it will not take? Then a line that breaks is never the fault of an item.
+    fn tells_refusals(&self) -> bool {
+        false
     }
 
     /// Greatest number of items in one batch. Live data waits for at most one batch of old data.

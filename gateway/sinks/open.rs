@@ -7,6 +7,7 @@ use super::opcua::OpcuaSink;
 use super::parquet::ParquetSink;
 use super::shdr::ShdrSink;
 use super::sparkplug::SparkplugSink;
+use super::webhook::WebhookSink;
 use super::{Requests, Sink, SinkAddress, SinkTarget};
 use gateway_history::Outbox;
 use std::path::Path;
@@ -28,5 +29,6 @@ pub fn open_sink(
         SinkTarget::Parquet(target) => Box::new(ParquetSink::new(target.clone(), outbox, history)),
         SinkTarget::Shdr(target) => Box::new(ShdrSink::new(target.clone(), outbox)),
         SinkTarget::Sparkplug(target) => Box::new(SparkplugSink::new(target.clone(), (name, requests), outbox)),
+        SinkTarget::Webhook(target) => Box::new(WebhookSink::new(target.clone(), outbox)),
     }
 }

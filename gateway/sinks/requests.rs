@@ -1,13 +1,19 @@
 //! Requests to the gate that come over a sink's connection: who may ask, how often, and what is answered.
 //!
 //! A sink hands every message that looks like a request to [`Requests::submit_change`], whether it is allowed or not: the tick writes
-//! all of them into the audit, carries out what is allowed, and says what became of it.
+//! all of them into the audit, carries out what is allowed, and says what became of it: an answer at once, and one outcome when
+//! the machine has followed or will not ([`RequestOutcome`]), which the sink fetches with [`Requests::wait_for_outcome`].
 
 use adapter_core::clock::{SECOND_NS, TimeNs};
-use gateway_base::clock;
 use gateway_base::row_rate::RowRate;
-use gateway_control::{NetworkRequest, OrderSender, Reply, RequestOrigin, RequestRefusal, RequestedChange};
+use gateway_base::{clock, moment};
+use gateway_control::{
+    NetworkRequest, OUTCOMES_MAX, OrderSender, OutcomeSender, Reply, RequestOrigin, RequestOutcome, RequestRefusal,
+    RequestedChange,
+};
+use serde_json::{Value as Json, json};
 use std::collections::VecDeque;
+use tokio::sync::mpsc::{Receiver, channel};
 
 /// Requests per second on average, and at once. A plant's system asks a few times an hour and repeats once in half a minute;
 /// whoever sends more fills the audit and holds up data: each waits for the tick, at most a tenth of a second. What is beyond is
@@ -32,15 +38,23 @@ pub struct Requests {
     began_ns: TimeNs,
     /// Marks of the requests that are young enough to come again.
     recent_ids: VecDeque<(TimeNs, String)>,
+    /// How outcomes come, and the oldest that is not told yet.
+    outcomes: OutcomeSender,
+    coming: Receiver<RequestOutcome>,
+    untold: Option<RequestOutcome>,
 }
 
 impl Requests {
     /// Of the sink of this name; `allowed` is what its configuration says.
     #[must_use]
     pub fn new(sink: &str, allowed: bool, orders: Option<OrderSender>) -> Self {
+        let (outcomes, coming) = channel(OUTCOMES_MAX);
         Self {
             sink: sink.to_owned(),
             allowed,
+            outcomes,
+            coming,
+            untold: None,
             orders,
             rate: RowRate::new(PER_S, AT_ONCE),
             began_ns: clock::now_ns(),
@@ -73,7 +87,28 @@ impl Requests {
             (true, change) => change.and_then(|change| self.check_fresh(&origin, now_ns).map(|()| change)),
         };
         let Some(post) = &self.orders else { return Some(Reply::from_refusal("there is no gate here")) };
-        Some(post.send_request(NetworkRequest { sink: self.sink.clone(), origin, change, left_out }).await)
+        let request = NetworkRequest { sink: self.sink.clone(), origin, change, left_out };
+        Some(post.send_request(request, &self.outcomes).await)
+    }
+
+    /// Waits until an outcome is to be told. It may be dropped and called again.
+    pub async fn wait_for_outcome(&mut self) {
+        if self.untold.is_none() {
+            self.untold = self.coming.recv().await;
+        }
+    }
+
+    /// The oldest outcome that is to be told, if there is one; it stays until [`Requests::forget_outcome`].
+    pub fn next_outcome(&mut self) -> Option<&RequestOutcome> {
+        if self.untold.is_none() {
+            self.untold = self.coming.try_recv().ok();
+        }
+        self.untold.as_ref()
+    }
+
+    /// It has been told.
+    pub fn forget_outcome(&mut self) {
+        self.untold = None;
     }
 
     /// Is it asked for now, and for the first time? What the run before may have obeyed is older than this run, so nothing needs to be
@@ -98,6 +133,15 @@ impl Requests {
         self.recent_ids.push_back((issued_ns, id.clone()));
         Ok(())
     }
+}
+
+/// An outcome as a document.
+pub(crate) fn format_outcome(outcome: &RequestOutcome) -> Json {
+    let RequestOutcome { origin, ending, why, text, asked_pct, in_force_pct, at_ns } = outcome;
+    json!({
+        "id": origin.id, "from": origin.asker, "outcome": ending.as_word(), "why": why, "text": text,
+        "asked_pct": asked_pct, "in_force_pct": in_force_pct, "time_utc": moment::format_utc(*at_ns),
+    })
 }
 
 fn refuse_change(sink: &str, change: Result<RequestedChange, RequestRefusal>) -> RequestRefusal {

@@ -323,6 +323,15 @@ pub struct TickStatus {
     pub skipped: u64,
 }
 
+/// Energy that was drawn since the start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChannelEnergy {
+    /// The power that it is counted from.
+    pub channel: &'static str,
+    /// Energy, J; what a braking spindle gives back is not taken off.
+    pub joules: f64,
+}
+
 /// The document `status/1` of one tick.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Status {
@@ -359,6 +368,9 @@ pub struct Status {
     pub twin: Option<gateway_diagnosis::status::TwinStatus>,
     /// Finished parts since the start.
     pub parts: u64,
+    /// Energy since the start, by the power that it is counted from; for the metrics.
+    #[serde(skip)]
+    pub energies: Vec<ChannelEnergy>,
     /// The way of an override to the machine.
     pub gate: GateStatus,
     /// The controllers and meters that are read.

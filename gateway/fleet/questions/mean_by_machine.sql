@@ -1,19 +1,17 @@
 -- Mean power of each machine over the last six hours, weighted by the time for which each value held.
-WITH wanted AS (
-  SELECT series_id, name, unit FROM series WHERE name = 'spindle_power_w'
-), told AS (
-  -- The value that held when the six hours began is up to an hour older: a box repeats every value at least so often.
-  SELECT items.box_id, series_id, name, unit, at, sequence, numbers[array_position(series, series_id)] AS number
-  FROM wanted JOIN items ON kind = 'gap' OR (kind = 'sample' AND series @> ARRAY[series_id])
-  WHERE at >= now() - interval '7 hours' AND at < now()
-), held AS (
-  SELECT box_id, name, unit, number, greatest(at, now() - interval '6 hours') AS since,
-         least(coalesce(lead(at) OVER (PARTITION BY box_id, series_id ORDER BY at, sequence), last_at), now()) AS until
-  FROM told JOIN box_latest USING (box_id)
-), spent AS (
-  SELECT box_id, name, unit, number, extract(epoch FROM until - since)::float8 AS seconds FROM held WHERE number IS NOT NULL AND until > since
+WITH spent AS (
+  SELECT boxes.box_id, series_id, number, seconds
+  FROM boxes JOIN box_latest USING (box_id) CROSS JOIN (SELECT series_id FROM series WHERE name = 'spindle_power_w') AS wanted
+  CROSS JOIN LATERAL (
+    -- The value that held when the six hours began is up to an hour older: a box repeats every value at least so often.
+    SELECT numbers[array_position(series, wanted.series_id)] AS number,
+           extract(epoch FROM least(coalesce(lead(at) OVER (ORDER BY at, sequence), last_at), now()) - greatest(at, now() - interval '6 hours'))::float8 AS seconds
+    FROM items
+    WHERE items.box_id = boxes.box_id AND at >= now() - interval '7 hours' AND at < now() AND (kind = 'gap' OR (kind = 'sample' AND series @> ARRAY[wanted.series_id]))
+  ) AS held
+), known AS (
+  SELECT box_id, series_id, sum(number * seconds) AS total, sum(seconds) AS seconds FROM spent WHERE number IS NOT NULL AND seconds > 0 GROUP BY box_id, series_id
 )
-SELECT label AS machine, name, unit, sum(number * seconds) / sum(seconds) AS mean, sum(seconds) / 3600 AS hours_known
-FROM spent JOIN labels USING (box_id)
-GROUP BY label, name, unit
+SELECT label AS machine, name, unit, total / seconds AS mean, seconds / 3600 AS hours_known
+FROM known JOIN series USING (series_id) JOIN labels USING (box_id)
 ORDER BY label;

@@ -1,34 +1,27 @@
 -- After the partitions of the new times are there: see redate.sql.
-DELETE FROM part_list USING moving WHERE part_list.box_id = moving.box_id AND ended = at AND part_list.sequence = moving.sequence AND part_list.epoch = moving.epoch;
-DELETE FROM operation_list USING moving
-WHERE operation_list.box_id = moving.box_id AND ended = at AND operation_list.sequence = moving.sequence AND operation_list.epoch = moving.epoch;
-DELETE FROM alarm_marks USING moving
-WHERE alarm_marks.box_id = moving.box_id AND alarm_marks.at = moving.at AND alarm_marks.sequence = moving.sequence AND alarm_marks.epoch = moving.epoch;
-DELETE FROM event_list USING moving
-WHERE event_list.box_id = moving.box_id AND event_list.at = moving.at AND event_list.sequence = moving.sequence AND event_list.epoch = moving.epoch;
-DELETE FROM decision_list USING moving
-WHERE decision_list.box_id = moving.box_id AND decision_list.at = moving.at AND decision_list.sequence = moving.sequence AND decision_list.epoch = moving.epoch;
-DELETE FROM diagnosis_list USING moving
-WHERE diagnosis_list.box_id = moving.box_id AND diagnosis_list.at = moving.at AND diagnosis_list.sequence = moving.sequence AND diagnosis_list.epoch = moving.epoch;
-DELETE FROM gap_list USING moving
-WHERE gap_list.box_id = moving.box_id AND since = at AND gap_list.sequence = moving.sequence AND gap_list.epoch = moving.epoch;
-DELETE FROM state_list USING moving
-WHERE state_list.box_id = moving.box_id AND since IN (at, fleet_time((record ->> 'until_ns')::bigint))
-  AND state_list.sequence = moving.sequence AND state_list.epoch = moving.epoch;
+-- What was made of the items at their old times goes; it is made anew of the moved ones. A gap has made a row at its end, too.
+DO $$ DECLARE made record; BEGIN
+  FOR made IN SELECT * FROM (VALUES ('part_list', 'ended'), ('operation_list', 'ended'), ('alarm_marks', 'at'), ('event_list', 'at'), ('decision_list', 'at'),
+    ('diagnosis_list', 'at'), ('gap_list', 'since'), ('state_list', 'since')) AS every (name, time_column)
+  LOOP
+    EXECUTE format('DELETE FROM %1$I AS old USING moving WHERE old.box_id = moving.box_id AND old.sequence = moving.sequence AND old.epoch = moving.epoch
+      AND old.%2$I IN (moving.at, fleet_time((moving.record ->> ''until_ns'')::bigint))', made.name, made.time_column);
+  END LOOP;
+END $$;
 -- The places of means that are of other minutes.
 CREATE TEMP TABLE emptied ON COMMIT DROP AS
 SELECT box_id, kind, date_trunc(CASE kind WHEN 'minute' THEN 'hour' WHEN 'hour' THEN 'day' ELSE 'month' END, at) AS start,
        array_agg(DISTINCT CASE kind WHEN 'minute' THEN extract(minute FROM at) + 1 WHEN 'hour' THEN extract(hour FROM at) + 1 ELSE extract(day FROM at) END::int) AS places
 FROM moving WHERE kind IN ('minute', 'hour', 'day') GROUP BY 1, 2, 3;
-UPDATE minute_means AS old SET mean = fleet_emptied(mean, places), least = fleet_emptied(least, places), greatest = fleet_emptied(greatest, places),
-  seconds = fleet_emptied(seconds, places)
-FROM emptied CROSS JOIN series WHERE kind = 'minute' AND old.series_id = series.series_id AND old.box_id = emptied.box_id AND hour = start;
-UPDATE hour_means AS old SET mean = fleet_emptied(mean, places), least = fleet_emptied(least, places), greatest = fleet_emptied(greatest, places),
-  seconds = fleet_emptied(seconds, places)
-FROM emptied CROSS JOIN series WHERE kind = 'hour' AND old.series_id = series.series_id AND old.box_id = emptied.box_id AND day = start;
-UPDATE day_means AS old SET mean = fleet_emptied(mean, places), least = fleet_emptied(least, places), greatest = fleet_emptied(greatest, places),
-  seconds = fleet_emptied(seconds, places)
-FROM emptied CROSS JOIN series WHERE kind = 'day' AND old.series_id = series.series_id AND old.box_id = emptied.box_id AND month = start;
+DO $$ DECLARE means record; BEGIN
+  FOR means IN SELECT * FROM (VALUES ('minute', 'hour'), ('hour', 'day'), ('day', 'month')) AS every (kind, time_column)
+  LOOP
+    EXECUTE format('UPDATE %1$I AS old SET mean = fleet_emptied(mean, places), least = fleet_emptied(least, places), greatest = fleet_emptied(greatest, places),
+        seconds = fleet_emptied(seconds, places)
+      FROM emptied CROSS JOIN series
+      WHERE kind = %2$L AND old.series_id = series.series_id AND old.box_id = emptied.box_id AND old.%3$I = start', means.kind || '_means', means.kind, means.time_column);
+  END LOOP;
+END $$;
 -- The newest values keep their values and get their times.
 UPDATE box_latest SET cells = (
   SELECT coalesce(jsonb_object_agg(key, CASE WHEN by_ns IS NULL THEN value ELSE jsonb_set(value, '{0}', to_jsonb(((value ->> 0)::bigint * 1000 + by_ns) / 1000)) END), '{}')

@@ -5,7 +5,7 @@
 //! `latest_s`.
 //!
 //! With `allow_requests` the box subscribes `PREFIX/request` and hands what comes to the gate ([`Requests`]); the answer goes to
-//! `PREFIX/request/answer`. Without it nothing is subscribed: a network cannot ask the box for anything this way.
+//! `PREFIX/request/answer`, and what became of it in the end to `PREFIX/request/outcome`. Without it nothing is subscribed: a network cannot ask the box for anything this way.
 
 mod discovery;
 mod layout;
@@ -16,6 +16,7 @@ pub use layout::Layout;
 pub(super) use layout::build_document;
 
 use super::broker::{BrokerFailure, BrokerTarget, Link, client_name};
+use super::requests::format_outcome;
 use super::{Batch, Pending, Requests, Sink, SinkError};
 use crate::address::TargetError;
 use adapter_core::address::Keys;
@@ -122,6 +123,17 @@ impl MqttSink {
         let topic = self.format_topic("request/answer");
         let answer = Outgoing { topic, payload: says.to_string().into_bytes(), retain: false };
         self.publish_messages(vec![answer], Qos::AtMostOnce).await
+    }
+
+    /// Publishes which requests the machine has followed, and which it has not.
+    async fn tell_outcomes(&mut self) -> Result<(), SinkError> {
+        while let Some(outcome) = self.requests.next_outcome().map(format_outcome) {
+            let topic = self.format_topic("request/outcome");
+            let told = Outgoing { topic, payload: outcome.to_string().into_bytes(), retain: false };
+            self.publish_messages(vec![told], Qos::AtLeastOnce).await?;
+            self.requests.forget_outcome();
+        }
+        Ok(())
     }
 
     fn topic_prefix(&self) -> String {
@@ -274,6 +286,7 @@ impl Sink for MqttSink {
             tokio::select! {
                 message = self.link.next(&self.target.broker) => self.request = Some(message?),
                 () = until_due => {}
+                () = self.requests.wait_for_outcome() => {}
             }
             Ok(())
         })
@@ -282,10 +295,10 @@ impl Sink for MqttSink {
     fn serve_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(async move {
             self.tell_latest().await?;
-            match self.request.take().filter(|message| message.topic == self.format_topic("request")) {
-                Some(message) => self.answer_request(message).await,
-                None => Ok(()),
+            if let Some(message) = self.request.take().filter(|message| message.topic == self.format_topic("request")) {
+                self.answer_request(message).await?;
             }
+            self.tell_outcomes().await
         })
     }
 

@@ -4,23 +4,26 @@
 //! |---|---|---|
 //! | `request/feed_override_pct` | Double | ask the gate for this feed override; null: no longer |
 //! | `request/acknowledge_alarm` | String | the alarm of this code has been seen |
-//! | `request/answer` | String | JSON: `done`, and `text` with what became of it |
+//! | `request/answer` | String | JSON: `done`, `text` with what is made of it, and `id` |
+//! | `request/outcome` | String | JSON: whether the machine has followed, under the same `id` |
 //!
 //! A host may name a metric by its alias alone, as the birth gave it.
 
 use super::births::REBIRTH;
 use super::payload::{Metric, MetricValue, Payload, datatype};
-use gateway_control::{RequestOrigin, RequestRefusal, RequestedChange};
-use serde_json::json;
+use crate::requests::format_outcome;
+use gateway_control::{Reply, RequestOrigin, RequestOutcome, RequestRefusal, RequestedChange};
+use serde_json::{Value as Json, json};
 
 const FEED_OVERRIDE: (&str, u64) = ("request/feed_override_pct", 9);
 const ACKNOWLEDGE_ALARM: (&str, u64) = ("request/acknowledge_alarm", 10);
 const ANSWER: (&str, u64) = ("request/answer", 11);
+const OUTCOME: (&str, u64) = ("request/outcome", 12);
 
-/// Requests in one message; what is more is not looked at.
+/// Requests in one message; what is more is refused as a whole.
 const CHANGES_MAX: usize = 4;
 
-/// What a birth says of them: where requests are not allowed, only the answer, because a refusal is told too.
+/// What a birth says of them: where requests are not allowed, only the answer and the outcome, because a refusal is told too.
 pub(super) fn build_request_metrics(allowed: bool, at_ms: u64) -> Vec<Metric> {
     let null = |(name, alias): (&str, u64), datatype| Metric {
         alias: Some(alias),
@@ -30,15 +33,24 @@ pub(super) fn build_request_metrics(allowed: bool, at_ms: u64) -> Vec<Metric> {
     };
     let asked = [null(FEED_OVERRIDE, datatype::DOUBLE), null(ACKNOWLEDGE_ALARM, datatype::STRING)];
     let asked = asked.into_iter().filter(|_| allowed);
-    asked.chain([null(ANSWER, datatype::STRING)]).collect()
+    asked.chain([ANSWER, OUTCOME].map(|told| null(told, datatype::STRING))).collect()
 }
 
-/// What became of a request.
-pub(super) fn build_answer_metric(done: bool, text: &str, at_ms: u64) -> Metric {
+/// What is answered to a request.
+pub(super) fn build_answer_metric(reply: &Reply, id: Option<&str>, at_ms: u64) -> Metric {
+    build_told_metric(ANSWER.1, &json!({"done": reply.done, "text": reply.text, "id": id}), at_ms)
+}
+
+/// What became of a request in the end.
+pub(super) fn build_outcome_metric(outcome: &RequestOutcome, at_ms: u64) -> Metric {
+    build_told_metric(OUTCOME.1, &format_outcome(outcome), at_ms)
+}
+
+fn build_told_metric(alias: u64, document: &Json, at_ms: u64) -> Metric {
     Metric {
-        alias: Some(ANSWER.1),
+        alias: Some(alias),
         timestamp: Some(at_ms),
-        value: Some(MetricValue::Text(json!({"done": done, "text": text}).to_string())),
+        value: Some(MetricValue::Text(document.to_string())),
         ..Metric::default()
     }
 }
@@ -53,12 +65,23 @@ pub(super) struct AskedChange {
 /// What a command asks for; empty where every metric of it is one that the node itself obeys. A metric that nobody may write is refused,
 /// so that it is told and accounted for. A message that the broker has kept is refused: it would come again at every connection.
 pub(super) fn parse_changes(payload: &Payload, retained: bool) -> Vec<AskedChange> {
-    let asked = payload.metrics.iter().filter(|metric| !is_own(metric)).take(CHANGES_MAX);
+    let asked = || payload.metrics.iter().filter(|metric| !is_own(metric));
     let parse = |metric: &Metric| AskedChange {
         origin: origin_of(metric, payload.timestamp),
         change: if retained { Err(RequestRefusal::RetainedCommand) } else { parse_change(metric) },
     };
-    asked.map(parse).collect()
+    let count = asked().count();
+    let beyond = asked().nth(CHANGES_MAX).map(|metric| AskedChange {
+        origin: origin_of(metric, payload.timestamp),
+        change: Err(RequestRefusal::TooMany { count, most: CHANGES_MAX }),
+    });
+    asked().take(CHANGES_MAX).map(parse).chain(beyond).collect()
+}
+
+/// A command that is no payload at all.
+pub(super) fn refuse_unreadable(error: &str) -> AskedChange {
+    let refused = RequestRefusal::Unreadable { error: error.to_owned(), forms: "send a payload of Sparkplug B" };
+    AskedChange { origin: RequestOrigin::default(), change: Err(refused) }
 }
 
 /// What the node does without the gate.
@@ -144,6 +167,9 @@ mod tests {
         assert_eq!((origin.id.as_deref(), origin.issued_ns), (Some("request/feed_override_pct at 0"), Some(0)));
         assert_eq!(asked.into_iter().map(|it| it.change).collect::<Vec<_>>(), expected);
         assert!(parse_changes(&all, true).iter().all(|it| it.change.is_err()), "retained");
+        let many = payload((0..9).map(|_| named("spindle_power_w", MetricValue::Double(1.0))).collect());
+        let last = parse_changes(&many, false).pop().map(|it| it.change);
+        assert_eq!(last, Some(Err(RequestRefusal::TooMany { count: 9, most: CHANGES_MAX })));
     }
 
     #[test]

@@ -13,7 +13,8 @@
 //!   that it goes the death of the node is sent and the connection ends; meanwhile everything waits in the outbox. Without it, data that the broker has
 //!   read while nobody listened is gone: at quality of service 0 a broker keeps nothing.
 //! - Commands: `Node Control/Rebirth` is obeyed. With `allow_requests` the metrics `request/...` are handed to the gate
-//!   ([`Requests`]), otherwise they are refused; both are told in `request/answer`. Nothing else that comes from the network
+//!   ([`Requests`]), otherwise they are refused; both are told in `request/answer`, later in
+//!   `request/outcome`. Nothing else that comes from the network
 //!   reaches anything.
 //!
 //! Without a DEVICE the metrics are those of the node itself.
@@ -31,7 +32,6 @@ use crate::address::TargetError;
 use adapter_core::address::Keys;
 use commands::AskedChange;
 use gateway_base::clock;
-use gateway_control::Reply;
 use gateway_history::{Cell, Outbox};
 use host::PrimaryHost;
 use mqtt::{Outgoing, Qos, Will};
@@ -134,7 +134,13 @@ impl SparkplugSink {
         if !of_node && message.topic != self.target.format_topic("DCMD") {
             return false;
         }
-        let Ok(payload) = Payload::decode(&message.payload[..]) else { return false };
+        let payload = match Payload::decode(&message.payload[..]) {
+            Ok(payload) => payload,
+            Err(error) => {
+                self.requested_changes = vec![commands::refuse_unreadable(&error.to_string())];
+                return true;
+            }
+        };
         self.rebirth |= of_node && births::asks_rebirth(&payload);
         self.requested_changes = commands::parse_changes(&payload, message.retained);
         self.rebirth || !self.requested_changes.is_empty()
@@ -143,12 +149,21 @@ impl SparkplugSink {
     /// Hands to the gate what was asked for, and tells what became of it.
     async fn answer_requests(&mut self) -> Result<(), SinkError> {
         for AskedChange { origin, change } in std::mem::take(&mut self.requested_changes) {
-            let Some(Reply { done, text }) = self.requests.submit_change(origin, change).await else { continue };
-            let (at_ms, kind) = (now_ms(), self.data_kind());
-            let told = self.build_message(kind, vec![commands::build_answer_metric(done, &text, at_ms)], at_ms);
-            self.publish_messages(vec![told]).await.map_err(|(_, failure)| failure.of_item(None))?;
+            let id = origin.id.clone();
+            let Some(reply) = self.requests.submit_change(origin, change).await else { continue };
+            self.tell_metric(commands::build_answer_metric(&reply, id.as_deref(), now_ms())).await?;
+        }
+        while let Some(outcome) = self.requests.next_outcome() {
+            let told = commands::build_outcome_metric(outcome, now_ms());
+            self.tell_metric(told).await?;
+            self.requests.forget_outcome();
         }
         Ok(())
+    }
+
+    async fn tell_metric(&mut self, metric: payload::Metric) -> Result<(), SinkError> {
+        let told = self.build_message(self.data_kind(), vec![metric], now_ms());
+        self.publish_messages(vec![told]).await.map_err(|(_, failure)| failure.of_item(None))
     }
 
     fn data_kind(&self) -> &'static str {
@@ -321,7 +336,10 @@ impl Sink for SparkplugSink {
     fn wait_for_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(async move {
             loop {
-                let message = self.link.next(&self.target.broker).await?;
+                let message = tokio::select! {
+                    message = self.link.next(&self.target.broker) => message?,
+                    () = self.requests.wait_for_outcome() => return Ok(()),
+                };
                 if self.accept_message(&message) {
                     return Ok(());
                 }

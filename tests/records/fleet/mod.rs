@@ -19,5 +19,6 @@ mod restored;
 mod secured;
 mod shifts;
 mod sizes;
+mod stream_size;
 mod told;
 mod versions;

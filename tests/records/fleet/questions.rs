@@ -17,6 +17,7 @@ const MACHINES: [&str; 3] = ["Lathe 7", "车床三号", "Mill 2"];
 #[derive(Debug, Default)]
 struct Truth {
     power: f64,
+    cutting_power: f64,
     seconds_by_state: BTreeMap<&'static str, f64>,
     parts: i64,
     energy_j: f64,
@@ -37,7 +38,7 @@ fn record(machine: &str, factor: f64, start_ns: i64, address: &str) -> Truth {
     let recorded = Recorded::start(machine, Duration::from_secs(1), address);
     let power = ChannelId::from_name("spindle_power_w").expect("in the table");
     let mut truth = Truth::default();
-    let (mut state, mut sum) = ("", 0.0);
+    let (mut state, mut sum, mut cutting) = ("", 0.0, 0.0);
     for second in 0..SPAN_S {
         let (at_ns, place) = (start_ns + second * SECOND_NS, second % 600);
         let next = match place {
@@ -58,6 +59,7 @@ fn record(machine: &str, factor: f64, start_ns: i64, address: &str) -> Truth {
         }
         *truth.seconds_by_state.entry(next).or_default() += 1.0;
         sum += watts;
+        cutting += if next == "cutting" { watts } else { 0.0 };
         recorded.tick(at_ns, &[(power, Ok(watts))], next);
         let cycle = second / 600;
         if cycle % 3 == 0 && place == 200 {
@@ -99,6 +101,7 @@ fn record(machine: &str, factor: f64, start_ns: i64, address: &str) -> Truth {
         ..Diagnosis::default()
     });
     truth.power = sum / SPAN_S as f64;
+    truth.cutting_power = cutting / truth.seconds_by_state["cutting"];
     recorded.stop();
     truth
 }
@@ -131,6 +134,7 @@ fn every_question_is_answered_as_the_boxes_know() {
     let of =
         |rows: &[Vec<String>], machine: &str| rows.iter().filter(|row| row[0] == machine).cloned().collect::<Vec<_>>();
     let means = asked(&plant, "mean-by-machine");
+    let cutting = asked(&plant, "power-while-cutting");
     let hours = asked(&plant, "series-over-machines");
     let states = asked(&plant, "states-by-machine");
     let energy = asked(&plant, "energy-per-part");
@@ -140,6 +144,9 @@ fn every_question_is_answered_as_the_boxes_know() {
         // The last six of eight hours: all but the cycle at its beginning are whole.
         let mean = number(&of(&means, machine)[0][3]);
         assert!((mean / truth.power - 1.0).abs() < 0.01, "{mean}, expected {}", truth.power);
+        let cut = &of(&cutting, machine)[0];
+        near(number(&cut[1]), truth.cutting_power, "power while cutting");
+        assert!((number(&cut[2]) / (6.0 * 0.8) - 1.0).abs() < 0.01, "eight minutes of ten, six hours: {cut:?}");
         let weighted: (f64, f64) = of(&hours, machine)
             .iter()
             .map(|row| (number(&row[2]) * number(&row[5]), number(&row[5])))

@@ -15,10 +15,12 @@ const PATIENCE: Duration = Duration::from_secs(60);
 const FEED: &str = "request/feed_override_pct";
 /// The alias of `request/answer`; data names metrics by alias alone.
 const ANSWER: u64 = 11;
+/// That of `request/outcome`.
+const OUTCOME: u64 = 12;
 /// Asks for nothing; one alarm stands.
 const SCRIPT: &str = "alarm(\"door\", \"the door was opened\");";
 
-fn start(address: &str, more: &str) -> Sending {
+pub(crate) fn start(address: &str, more: &str) -> Sending {
     let machine = "simulated://lathe?dropouts_per_h=0&begun_s=260";
     let sending = Sending::with_script(machine, "1", address, more, Some(SCRIPT));
     sending.wait_sink("connected", |sink| sink["state"] == "connected");
@@ -34,19 +36,21 @@ fn sparkplug(more: &str) -> Option<(Broker, Host, Sending)> {
     Some((broker, host, sending))
 }
 
+/// The documents that were told under this alias.
+fn told(heard: &[Json], alias: u64) -> Vec<Json> {
+    let data = heard.iter().filter(|message| message["kind"] == "DDATA");
+    let metrics = data.flat_map(|message| message["metrics"].as_array().cloned().unwrap_or_default());
+    let of_alias = metrics.filter(|metric| metric["alias"] == alias && metric["null"] == false);
+    of_alias.filter_map(|metric| serde_json::from_str(metric["value"].as_str()?).ok()).collect()
+}
+
 /// Sends a metric and gives the answer.
 fn ask(host: &mut Host, name: &str, kind: &str, value: &str) -> Json {
-    let answers = |heard: &[Json]| -> Vec<Json> {
-        let data = heard.iter().filter(|message| message["kind"] == "DDATA");
-        let metrics = data.flat_map(|message| message["metrics"].as_array().cloned().unwrap_or_default());
-        let told = metrics.filter(|metric| metric["alias"] == ANSWER && metric["null"] == false);
-        told.filter_map(|metric| serde_json::from_str(metric["value"].as_str()?).ok()).collect()
-    };
-    let before = answers(&host.heard()).len();
+    let before = told(&host.heard(), ANSWER).len();
     host.command("plant/line-1", name, kind, value);
     let mut found = Json::Null;
     host.wait(&format!("the answer to {name} {value}"), |heard| {
-        found = answers(heard).get(before).cloned().unwrap_or_default();
+        found = told(heard, ANSWER).get(before).cloned().unwrap_or_default();
         !found.is_null()
     });
     found
@@ -76,6 +80,7 @@ fn by_default_a_command_of_the_network_is_refused_told_and_audited() {
     assert_eq!(alarm["done"], false);
     sending.stop();
     assert_eq!(outcomes(&sending, "network_request"), ["refused", "refused"]);
+    assert!(outcomes(&sending, "network_outcome").is_empty(), "one row holds a refusal");
     assert!(outcomes(&sending, "request").is_empty(), "the gate has seen nothing");
 }
 
@@ -117,17 +122,24 @@ fn what_the_network_asks_for_is_judged_like_a_script_and_written_only_when_a_per
     assert_eq!(gate(&sending)["written_pct"], Json::Null, "nobody has armed");
     let armed = sending.order(&["arm", "--for", "5m", "--by", "fitter"]);
     assert!(armed.contains("armed by fitter"), "{armed}");
+    let forgotten = || gate(&sending)["wanted_pct"].is_null().then_some(());
+    wait_for("what was asked for before counts no more", PATIENCE, forgotten);
+    assert_eq!(ask(&mut host, FEED, "double", "20")["done"], true);
     // The request stands for a minute; the spindle turns a quarter of a minute after the start.
-    let mut asked = Instant::now();
-    wait_for("the least that the gate allows is in force", Duration::from_secs(100), || {
-        if asked.elapsed() > Duration::from_secs(25) {
-            assert_eq!(ask(&mut host, FEED, "double", "20")["done"], true);
-            asked = Instant::now();
-        }
+    wait_for("the least that the gate allows is in force", PATIENCE, || {
         (gate(&sending)["written_pct"] == 50.0).then_some(())
     });
+    host.wait("the outcome of the request", |heard| told(heard, OUTCOME).len() >= 4);
     assert_eq!(ask(&mut host, FEED, "null", "-")["done"], true);
     wait_for("given back", PATIENCE, || gate(&sending)["wanted_pct"].is_null().then_some(()));
+    host.wait("the outcome of giving back", |heard| {
+        told(heard, OUTCOME).last().is_some_and(|it| it["outcome"] == "followed")
+    });
+    let settled: Vec<Json> = told(&host.heard(), OUTCOME);
+    let words: Vec<&str> = settled.iter().filter_map(|it| it["outcome"].as_str()).collect();
+    assert_eq!(words, ["refused", "not_written", "refused", "limited", "followed"], "{settled:?}");
+    assert_eq!((&settled[3]["asked_pct"], &settled[3]["in_force_pct"]), (&Json::from(20.0), &Json::from(50.0)));
+    assert!(settled[3]["id"].as_str().is_some_and(|id| id.starts_with(FEED)), "{:?}", settled[3]);
     sending.stop();
     assert!(outcomes(&sending, "write").contains(&"written".to_owned()), "the write names who asked");
     assert!(
@@ -135,7 +147,7 @@ fn what_the_network_asks_for_is_judged_like_a_script_and_written_only_when_a_per
     );
 }
 
-fn publish(port: u16, topic: &str, lines: &str, more: &[&str]) {
+pub(crate) fn publish(port: u16, topic: &str, lines: &str, more: &[&str]) {
     let mut command = Command::new(program("mosquitto_pub").expect("looked for before"));
     command.args(["-h", "localhost", "-p", &port.to_string(), "-t", topic, "-q", "1", "-l"]).args(more);
     let mut child = command.stdin(Stdio::piped()).spawn().expect("mosquitto_pub runs");
@@ -182,13 +194,18 @@ fn a_plain_topic_asks_too_and_whatever_else_comes_there_is_refused() {
     assert!(sending.audit().iter().any(names), "the audit names who asked");
 }
 
-/// The line with this id, who asks, and when: so many seconds ago.
+/// The line with this id, asked by `mes` so many seconds ago.
 fn stamp_request(line: &str, id: &str, ago_s: i64) -> String {
+    stamp_request_of("mes", line, id, ago_s)
+}
+
+/// The line with this id, who asks, and when: so many seconds ago.
+pub(crate) fn stamp_request_of(asker: &str, line: &str, id: &str, ago_s: i64) -> String {
     let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("after 1970");
     let at_ns = i64::try_from(since.as_nanos()).expect("before 2262") - ago_s * 1_000_000_000;
     let at = gateway::moment::format_utc(at_ns);
     match line.strip_suffix('}') {
-        Some(open) => format!("{open},\"id\":\"{id}\",\"from\":\"mes\",\"issued_at\":\"{at}\"}}\n"),
+        Some(open) => format!("{open},\"id\":\"{id}\",\"from\":\"{asker}\",\"issued_at\":\"{at}\"}}\n"),
         None => format!("{line}\n"),
     }
 }
