@@ -48,6 +48,7 @@ use gateway_http::{
 };
 use gateway_pipeline::Pipeline;
 use gateway_sources::open::{self, MachineSpeed, Sources};
+use gateway_sources::origin_log::OriginLog;
 use gateway_status::alignment;
 use health::Health;
 use history_store::HistoryStore;
@@ -280,6 +281,7 @@ fn build_ticker(
             identity,
             schedule: pace,
             feed,
+            origins: OriginLog::default(),
             pipeline,
             commands,
             machines,
