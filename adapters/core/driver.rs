@@ -171,7 +171,8 @@ pub trait Source: Send {
     fn period(&self) -> Duration;
 
     /// The pace that the device can keep, asked for after every read: at least [`Source::period`], longer where the device
-    /// takes its time. What is older than two of these counts as stale.
+    /// takes its time. What is older than two of these counts as stale. It is read sooner where this is long, to notice that the device
+    /// is quick again: a source that says so bounds by itself how much it asks of its device.
     fn achievable_period(&self) -> Duration {
         self.period()
     }

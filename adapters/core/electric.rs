@@ -23,6 +23,8 @@ const SUPPLY_HZ: (f64, f64) = (45.0, 65.0);
 const APART: (f64, f64) = (0.1, 20.0);
 /// Apparent power below this share of voltage times current is that of a part of the phases.
 const PART: f64 = 0.5;
+/// Below this apparent power, VA, a power factor is noise.
+const LOADED_VA: f64 = 100.0;
 /// So many answers in a row.
 const LASTS: u32 = 2;
 
@@ -56,6 +58,8 @@ pub struct Doubts {
     pub voltage: bool,
     /// Powers of every kind and the power factor.
     pub power: bool,
+    /// The power factor alone.
+    pub power_factor: bool,
     /// The frequency of the supply.
     pub frequency: bool,
     /// Why something is not believed; empty when nothing is doubted.
@@ -100,6 +104,8 @@ impl SupplyCheck {
             });
         }
         judge_zeros(values, &mut doubts);
+        // Before anything has agreed it is the map that is not proven: what contradicts it costs all that was read with it.
+        doubts.everything |= !self.has_agreed && (doubts.power || doubts.frequency || doubts.power_factor);
         doubts
     }
 
@@ -158,10 +164,26 @@ impl SupplyCheck {
             );
             doubts.add(what, WRONG_MAP, |doubts| doubts.power = true);
         }
-        if let Some(factor) = values.power_factor.filter(|factor| factor.abs() > 1.001) {
-            let what = format!("the meter says a power factor of {factor:.4e}, which cannot be more than 1");
-            doubts.add(what, WRONG_MAP, |doubts| doubts.power = true);
-        }
+        judge_power_factor(values, product, doubts);
+    }
+}
+
+/// A power factor is at most 1, and at least active power over voltage times current: that of the fundamental wave is higher than that of
+/// the whole.
+fn judge_power_factor(values: &SupplyValues, product: Option<f64>, doubts: &mut Doubts) {
+    let Some(factor) = values.power_factor else { return };
+    let least = product.zip(values.power).filter(|(product, _)| *product > LOADED_VA);
+    let least = least.map_or(0.0, |(product, power)| power.abs() / product);
+    // More than voltage times current is another contradiction, which is judged by itself.
+    if factor.abs() < least - APART.0 && least <= 1.0 + APART.0 {
+        let what = format!(
+            "wrong profile? The meter says a power factor of {factor:.4e}; its powers make at least {least:.2}"
+        );
+        doubts.add(what, WRONG_MAP, |doubts| doubts.power_factor = true);
+    }
+    if factor.abs() > 1.001 {
+        let what = format!("the meter says a power factor of {factor:.4e}, which cannot be more than 1");
+        doubts.add(what, WRONG_MAP, |doubts| doubts.power = true);
     }
 }
 
@@ -179,7 +201,10 @@ fn judge_voltages(values: &SupplyValues, doubts: &mut Doubts) {
     let phases: Vec<(usize, f64)> = (1..).zip(values.voltage).filter_map(|(at, volts)| Some((at, volts?))).collect();
     let bad: Vec<&(usize, f64)> = phases.iter().filter(|(_, volts)| !is_within_range(*volts, PHASE_V)).collect();
     let line_bad = values.line_voltage.filter(|volts| !is_within_range(*volts, LINE_V));
-    let some_good = bad.len() < phases.len() || (values.line_voltage.is_some() && line_bad.is_none());
+    // A fuse that is gone takes voltage away: what no supply has reached is no phase of this meter.
+    let too_high = bad.iter().any(|(_, volts)| *volts > PHASE_V.1);
+    let good = bad.len() < phases.len() || (values.line_voltage.is_some() && line_bad.is_none());
+    let some_good = good && !too_high;
     let told = |(at, volts): &(usize, f64)| format!("phase {at} {volts:.4e} V");
     let mut all: Vec<String> = bad.iter().map(|phase| told(phase)).collect();
     all.extend(line_bad.map(|volts| format!("between phases {volts:.4e} V")));
@@ -256,9 +281,39 @@ mod tests {
             let doubts = SupplyCheck::default().judge_values(&SupplyValues { voltage: [Some(volts); 3], ..well() });
             assert!(doubts.everything && doubts.problems.len() == 1, "{volts}: {doubts:?}");
         }
-        let one = SupplyCheck::default()
-            .judge_values(&SupplyValues { voltage: [Some(230.0), Some(0.0), Some(230.0)], ..well() });
+        // A meter that does not see the voltage of a phase does not see its power either.
+        let without_phase = SupplyValues {
+            voltage: [Some(230.0), Some(0.0), Some(230.0)],
+            power: Some(2000.0),
+            phase_power: [Some(1000.0), Some(0.0), Some(1000.0)],
+            apparent_power: Some(2200.0),
+            ..well()
+        };
+        let one = SupplyCheck::default().judge_values(&without_phase);
         assert!(!one.everything && one.voltage && one.problems[0].what.contains("phase 2"), "{one:?}");
+        let too_high = SupplyValues { voltage: [Some(510.0), Some(0.0), Some(230.0)], ..without_phase };
+        assert!(SupplyCheck::default().judge_values(&too_high).everything, "no fuse makes 510 V");
+    }
+
+    #[test]
+    fn a_power_factor_below_what_the_powers_make_is_not_believed() {
+        let mut check = SupplyCheck::default();
+        let zero = SupplyValues { power_factor: Some(0.0), ..well() };
+        let doubts = check.judge_values(&zero);
+        assert!(doubts.power_factor && !doubts.power && !doubts.everything, "the powers agree: {doubts:?}");
+        let idle = SupplyValues { power: Some(15.0), phase_power: [Some(5.0); 3], current: [Some(0.1); 3], ..zero };
+        assert_eq!(check.judge_values(&idle), Doubts::default(), "without a load it says nothing");
+    }
+
+    #[test]
+    fn before_anything_has_agreed_a_contradiction_costs_everything() {
+        let mut check = SupplyCheck::default();
+        let wrong = SupplyValues { power: Some(9000.0), ..well() };
+        assert!(check.judge_values(&wrong).everything);
+        assert!(!check.judge_values(&well()).everything);
+        check.judge_values(&wrong);
+        let later = check.judge_values(&wrong);
+        assert!(later.power && !later.everything, "the map is proven: {later:?}");
     }
 
     #[test]

@@ -23,6 +23,7 @@ pub mod sample;
 pub mod serial;
 pub mod stream;
 pub mod text;
+mod text_set;
 pub mod threads;
 pub mod tls;
 pub mod unique_id;

@@ -7,9 +7,10 @@
 
 use crate::channel::ChannelId;
 use crate::driver::{Fact, SourceProblem};
-use crate::reading::Reading;
-use crate::text::TEXT_BYTES_MAX;
+use crate::reading::{Reading, Value};
+use crate::text::{TEXT_BYTES_MAX, has_byte_mark};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// What was said of one channel and not believed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +27,8 @@ pub struct Plausibility {
     doubts: BTreeMap<ChannelId, Doubt>,
     /// Channels whose last text was longer than is kept, and how long the first of this stretch was, bytes.
     cut_texts: BTreeMap<ChannelId, usize>,
+    /// Channels whose last text has bytes in it that are no text, with the first such text of this stretch.
+    unread_texts: BTreeMap<ChannelId, Arc<str>>,
 }
 
 impl Plausibility {
@@ -36,6 +39,13 @@ impl Plausibility {
                 Some(bytes) => drop(self.cut_texts.entry(reading.channel).or_insert(bytes)),
                 None if reading.value.is_ok() => drop(self.cut_texts.remove(&reading.channel)),
                 None => {}
+            }
+            match &reading.value {
+                Ok(Value::Text(text)) if has_byte_mark(text) => {
+                    self.unread_texts.entry(reading.channel).or_insert_with(|| text.clone());
+                }
+                Ok(_) => drop(self.unread_texts.remove(&reading.channel)),
+                Err(_) => {}
             }
             match (reading.implausible, self.doubts.get_mut(&reading.channel)) {
                 (Some(number), Some(doubt)) => {
@@ -73,6 +83,7 @@ impl Plausibility {
             .filter(|(channel, number)| !channel.channel().accepts_number(*number))
             .map(describe_implausible)
             .chain(self.cut_texts.iter().map(describe_cut_text))
+            .chain(self.unread_texts.iter().map(describe_unread_text))
             .collect()
     }
 }
@@ -82,6 +93,13 @@ fn describe_cut_text((id, bytes): (&ChannelId, &usize)) -> SourceProblem {
         what: format!("{id} has a text of {bytes} bytes; only the first {TEXT_BYTES_MAX} are kept"),
         next: "Look at what sends it: names, messages and blocks are shorter; at a broker somebody else may publish in its place"
             .to_owned(),
+    }
+}
+
+fn describe_unread_text((id, text): (&ChannelId, &Arc<str>)) -> SourceProblem {
+    SourceProblem {
+        what: format!("{id} has bytes that are no text in the character set of this source, or whose set is not known: {text}"),
+        next: "Name the set of the control at the end of the address: encoding=gbk, shift_jis, euc-kr, big5 or windows-1252".to_owned(),
     }
 }
 

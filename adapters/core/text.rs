@@ -1,11 +1,12 @@
 //! Texts of devices: bytes in the character set of whoever built them.
 //!
 //! A control in a Chinese shop sends GBK, one in a Japanese shop Shift JIS, a newer one UTF-8, and none of them says so. The
-//! address of a source names the set (`encoding=gbk`), or leaves it to be found out: what is UTF-8 is UTF-8, what is no UTF-8
-//! and is GB 18030 (which holds GBK) is that. Bytes that are no text in the set are written as `\xB5`, so that they are never
-//! lost: a text with such a mark in it gives its bytes back.
+//! address of a source names the set (`encoding=gbk`), or leaves it to be found out: what is UTF-8 is UTF-8; else the characters that come
+//! out tell ([`crate::text_set`]). Bytes that are no text in the set, or whose set is not known, are written as `\xB5`, so that they are never
+//! lost: a text with such a mark in it gives its bytes back, and [`crate::plausibility`] tells of it.
 
-use encoding_rs::{Encoding, GB18030, UTF_8};
+use crate::text_set::find_text;
+use encoding_rs::{Encoding, UTF_8};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use thiserror::Error;
@@ -14,7 +15,7 @@ use thiserror::Error;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum TextEncoding {
-    /// UTF-8 where it is that, else GB 18030 where it is that.
+    /// UTF-8 where it is that, else the set that its characters speak for.
     #[default]
     Found,
     /// This character set; UTF-8 is tried before it.
@@ -56,12 +57,12 @@ impl TextEncoding {
     }
 
     fn decode_strictly(self, bytes: &[u8]) -> Option<Cow<'_, str>> {
-        let sets: &[&'static Encoding] = match &self {
-            Self::Found => &[UTF_8, GB18030],
-            Self::Named(set) => &[UTF_8, set],
-        };
         // A device that is set to another character set may send UTF-8 all the same; nothing else looks like UTF-8.
-        sets.iter().find_map(|set| set.decode_without_bom_handling_and_without_replacement(bytes))
+        let decode = |set: &'static Encoding| set.decode_without_bom_handling_and_without_replacement(bytes);
+        decode(UTF_8).or_else(|| match self {
+            Self::Found => find_text(bytes).map(Cow::Owned),
+            Self::Named(set) => decode(set),
+        })
     }
 }
 
@@ -107,6 +108,16 @@ fn mark_bytes(bytes: &[u8]) -> String {
         }
     }
     text
+}
+
+/// Has this text a byte in it that is no text in its set, or whose set is not known?
+#[must_use]
+pub fn has_byte_mark(text: &str) -> bool {
+    let is_mark = |at: usize| {
+        let digits = text.as_bytes().get(at + 2..at + 4);
+        digits.is_some_and(|digits| digits.iter().all(|byte| byte.is_ascii_digit() || (b'A'..=b'F').contains(byte)))
+    };
+    text.match_indices("\\x").any(|(at, _)| is_mark(at))
 }
 
 /// Longest text of a channel, of a fact or of an error, bytes: 256 characters of three bytes, as a Chinese one takes. Chosen by hand: no

@@ -1,7 +1,6 @@
 //! Channels besides those of the table: further axes and spindles by their own names, and the user's own. They are declared
 //! when the source is opened, and travel with the quick or with the slow group.
 
-use super::answer::FocasAnswer;
 use super::item::{FocasItem, Position, Question, Servo, Spindle};
 use super::line::Asked;
 use super::own_item::OwnItem;
@@ -209,21 +208,12 @@ impl Extra {
             From::Axis(axis, Of::Load) => to_number_value(view.axis_load(&axis.name)),
             From::Axis(axis, of @ Of::Current) => to_number_value(view.find_axis_value(of.to_item(), &axis.name)),
             From::Axis(axis, of) => {
-                to_number_value(find_value_at(view, of.to_item(), view.find_axis_place(&axis.name)?))
+                to_number_value(view.find_number_at(of.to_item(), view.find_axis_place(&axis.name)?))
             }
-            From::Spindle(at, what) => to_number_value(find_value_at(view, FocasItem::Spindles(*what), *at)),
+            From::Spindle(at, Spindle::Load) => to_number_value(view.spindle_load(*at)),
+            From::Spindle(at, what) => to_number_value(view.find_number_at(FocasItem::Spindles(*what), *at)),
             From::Own(_) => Err(Absence::NotSupported),
         }
-    }
-}
-
-/// The value at a place of an answer that has one per axis or spindle.
-fn find_value_at(view: &View<'_>, item: FocasItem, place: usize) -> OrAbsence<f64> {
-    match view.find_answer(item)? {
-        FocasAnswer::Numbers(values) | FocasAnswer::Data { values, .. } => {
-            values.get(place).copied().flatten().ok_or(Absence::NotSupported)
-        }
-        _ => Err(Absence::OutOfRange),
     }
 }
 

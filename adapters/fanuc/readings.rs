@@ -4,7 +4,7 @@ use super::alarms;
 use super::answer::{FocasAnswer, Status};
 use super::dial::Dial;
 use super::extra::Extra;
-use super::item::{FocasItem, Position, Servo, Spindle};
+use super::item::{FocasItem, Position, Servo};
 use super::line::Asked;
 use super::poll;
 use super::states::{self, OrAbsence};
@@ -136,7 +136,7 @@ pub fn append_fast_readings(
         to_number_value(view.feed_mm_min(FocasItem::Feed, view.feed_unit(&signals))),
         to_number_value(pct),
         to_number_value(signals.spindle_override()),
-        to_number_value(view.find_number(FocasItem::Spindles(Spindle::Load))),
+        to_number_value(view.spindle_load(0)),
     ];
     let words = [
         to_flag_value(signals.is_rapid()),

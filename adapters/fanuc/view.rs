@@ -2,7 +2,7 @@
 
 use super::answer::{FocasAnswer, PositionUnit, SpeedUnit, Status};
 use super::dial::Dial;
-use super::item::{FocasItem, Position, Servo, Stretch};
+use super::item::{FocasItem, Position, Servo, Spindle, Stretch};
 use super::line::Asked;
 use super::poll;
 use super::states::{OrAbsence, Signals};
@@ -87,6 +87,21 @@ impl View<'_> {
     /// off; natively it is there, and would give the same channel two meanings.
     pub(super) fn axis_load(&self, name: &str) -> OrAbsence<f64> {
         self.find_axis_value(FocasItem::Servos(Servo::Load), name).map(f64::abs)
+    }
+
+    /// Load of the spindle at this place, counted from 0: its size, for the same reason.
+    pub(super) fn spindle_load(&self, place: usize) -> OrAbsence<f64> {
+        self.find_number_at(FocasItem::Spindles(Spindle::Load), place).map(f64::abs)
+    }
+
+    /// The number at a place of an answer that has one per axis or spindle.
+    pub(super) fn find_number_at(&self, item: FocasItem, place: usize) -> OrAbsence<f64> {
+        match self.find_answer(item)? {
+            FocasAnswer::Numbers(values) | FocasAnswer::Data { values, .. } => {
+                values.get(place).copied().flatten().ok_or(Absence::NotSupported)
+            }
+            _ => Err(Absence::OutOfRange),
+        }
     }
 
     /// A position of the axis of this name: in millimetres whatever the machine measures in, in degrees where the caller

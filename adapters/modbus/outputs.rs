@@ -28,7 +28,10 @@ enum Believed {
     Always,
     /// Its value, while all of the answer is in doubt.
     WithAll,
+    /// Nothing beside it proves a counter: while anything tells against the map, it is not believed either.
+    AsEnergy,
     AsPower,
+    AsPowerFactor,
     /// As the voltage of the supply.
     AsVoltage,
     AsFrequency,
@@ -61,6 +64,8 @@ impl Believed {
         match self {
             Self::Always => false,
             Self::WithAll => doubts.everything,
+            Self::AsEnergy => doubts.everything || doubts.power || doubts.power_factor || doubts.frequency,
+            Self::AsPowerFactor => doubts.everything || doubts.power || doubts.power_factor,
             Self::AsPower => doubts.everything || doubts.power,
             Self::AsVoltage => doubts.everything || doubts.voltage,
             Self::AsFrequency => doubts.everything || doubts.frequency,
@@ -146,8 +151,8 @@ pub(super) fn list_channels(profile: &Profile, circuit: Circuit) -> Result<Vec<M
     let (law, voltages) = if line.is_empty() { (Law::BetweenPhases, voltages) } else { (Law::Mean, line) };
     add("supply_voltage_v", law, Believed::AsVoltage, voltages);
     for (name, believed, meaning) in [
-        (format!("{place}_energy_kwh"), Believed::WithAll, RegisterMeaning::Energy),
-        (format!("{place}_power_factor"), Believed::AsPower, RegisterMeaning::PowerFactor),
+        (format!("{place}_energy_kwh"), Believed::AsEnergy, RegisterMeaning::Energy),
+        (format!("{place}_power_factor"), Believed::AsPowerFactor, RegisterMeaning::PowerFactor),
         (format!("{place}_apparent_power_va"), Believed::AsPower, RegisterMeaning::ApparentPower),
         ("supply_frequency_hz".to_owned(), Believed::AsFrequency, RegisterMeaning::Frequency),
     ] {

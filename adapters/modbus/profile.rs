@@ -45,8 +45,17 @@ const VALUES_MAX: usize = 64;
 const BYTES_MAX: u64 = 256 * 1024;
 
 /// The shipped profiles: name and text.
-pub const SHIPPED: [(&str, &str); 9] = [
+pub const SHIPPED: [(&str, &str); 18] = [
     ("sdm630", include_str!("profiles/sdm630.toml")),
+    ("sdm72", include_str!("profiles/sdm72.toml")),
+    ("em340", include_str!("profiles/em340.toml")),
+    ("em24_e1", include_str!("profiles/em24_e1.toml")),
+    ("em24", include_str!("profiles/em24.toml")),
+    ("abb_b23", include_str!("profiles/abb_b23.toml")),
+    ("umg96", include_str!("profiles/umg96.toml")),
+    ("dtsu666", include_str!("profiles/dtsu666.toml")),
+    ("wago879", include_str!("profiles/wago879.toml")),
+    ("pro380", include_str!("profiles/pro380.toml")),
     ("iem3000", include_str!("profiles/iem3000.toml")),
     ("pm5xxx", include_str!("profiles/pm5xxx.toml")),
     ("pac", include_str!("profiles/pac.toml")),

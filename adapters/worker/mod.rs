@@ -30,6 +30,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+/// A beat that the device has stretched begins at most so long after the poll before it. A control that answers slowly for half a minute
+/// stretches the beat by as much as one poll takes, and is well again long before that; how much of its time may be asked of it is bounded by
+/// its own line. More would cost values that are there, less only turns of a loop.
+const STRETCHED_PAUSE_NS: i64 = 2 * SECOND_NS;
+
 /// A sleeping worker looks this often whether it shall stop.
 const STOP_LOOK_NS: i64 = SECOND_NS / 5;
 
@@ -306,7 +311,16 @@ impl Poller {
         if beats > 0 {
             locked(&self.shared.counters).count_missed(beats.unsigned_abs());
         }
-        due_ns + (beats + 1) * period_ns
+        self.limit_stretched_beat(due_ns + (beats + 1) * period_ns, ended_ns)
+    }
+
+    /// The next poll, where the device keeps a slower pace than was wanted, not later than it takes to notice that it is quick again.
+    fn limit_stretched_beat(&self, due_ns: TimeNs, ended_ns: TimeNs) -> TimeNs {
+        let wanted = self.settings.period.unwrap_or_else(|| self.source.period());
+        if self.period <= wanted {
+            return due_ns;
+        }
+        due_ns.min(ended_ns + saturate_to_wait_ns(wanted).max(STRETCHED_PAUSE_NS))
     }
 
     /// The pause when nothing has come for so long.

@@ -84,7 +84,7 @@ fn line() -> SourceError {
 #[test]
 fn a_good_source_keeps_its_pace_and_reaches_the_merge() {
     let (worker, polls, clock) = start(quick(), Box::new(|_| Ok(())));
-    let plan = SourcePlan { name: "faulty".into(), channels: vec![part_count()], period: PERIOD };
+    let plan = SourcePlan { name: "faulty".into(), channels: vec![part_count()], period: PERIOD, stand_in: vec![] };
     let mut merge = Merge::new(&[plan], Delay::default());
     wait_for(&polls, 40);
     assert!(worker.drain_into(&mut merge, SourceId(0)) >= 39);
@@ -120,7 +120,7 @@ fn a_machine_that_is_off_is_no_failure() {
     wait_for(&polls, 4);
     let stats = worker.stats(clock.now_ns());
     assert_eq!((stats.state, stats.failures, stats.last_error), (WorkerState::Off, 0, None));
-    let plan = SourcePlan { name: "faulty".into(), channels: vec![part_count()], period: PERIOD };
+    let plan = SourcePlan { name: "faulty".into(), channels: vec![part_count()], period: PERIOD, stand_in: vec![] };
     let (mut merge, mut sample) = (Merge::new(&[plan], Delay::default()), Sample::new_empty(0));
     worker.drain_into(&mut merge, SourceId(0));
     merge.sample_into(&mut sample, clock.now_ns());
@@ -218,7 +218,7 @@ fn a_slow_source_is_believed_its_own_pace() {
         }),
     );
     wait_for(&polls, 20);
-    let plan = SourcePlan { name: "faulty".into(), channels: vec![part_count()], period: PERIOD };
+    let plan = SourcePlan { name: "faulty".into(), channels: vec![part_count()], period: PERIOD, stand_in: vec![] };
     let (mut merge, mut sample) = (Merge::new(&[plan], Delay::Fixed(Duration::ZERO)), Sample::new_empty(0));
     worker.stop();
     wait_until(|| worker.is_finished());
@@ -229,4 +229,56 @@ fn a_slow_source_is_believed_its_own_pace() {
     merge.sample_into(&mut sample, newest_ns + 15_000_000);
     assert!(sample.number(part_count()).is_ok(), "{:?}", sample.slot(part_count()));
     worker.join();
+}
+
+/// A control that takes six seconds for a poll until half a minute is over, and says so.
+struct Spell {
+    channels: [ChannelId; 1],
+    polls_ns: Arc<Mutex<Vec<(TimeNs, TimeNs)>>>,
+    began_ns: Option<TimeNs>,
+    slow: bool,
+}
+
+impl Source for Spell {
+    fn name(&self) -> &str {
+        "spell"
+    }
+
+    fn channels(&self) -> &[ChannelId] {
+        &self.channels
+    }
+
+    fn period(&self) -> Duration {
+        Duration::from_millis(500)
+    }
+
+    fn achievable_period(&self) -> Duration {
+        if self.slow { Duration::from_secs(18) } else { self.period() }
+    }
+
+    fn read(&mut self, clock: &dyn Clock, _: &mut Vec<Reading>) -> Result<(), SourceError> {
+        let asked_ns = clock.now_ns();
+        self.slow = asked_ns - *self.began_ns.get_or_insert(asked_ns) < 30 * SECOND_NS;
+        if self.slow {
+            clock.sleep_until(asked_ns + 6 * SECOND_NS);
+        }
+        locked(&self.polls_ns).push((asked_ns, clock.now_ns()));
+        Ok(())
+    }
+}
+
+#[test]
+fn after_a_slow_spell_the_source_is_asked_again_within_seconds() {
+    let polls_ns = Arc::new(Mutex::new(Vec::new()));
+    let clock: Arc<dyn Clock> = Arc::new(ScaledClock::new(50.0));
+    let source = Spell { channels: [part_count()], polls_ns: polls_ns.clone(), began_ns: None, slow: false };
+    let worker = Worker::start(Box::new(source), clock.clone(), WorkerSettings::default()).expect("a thread");
+    wait_until(|| locked(&polls_ns).len() >= 8);
+    worker.join();
+    let polls = locked(&polls_ns).clone();
+    let pauses: Vec<i64> = polls.windows(2).map(|pair| (pair[1].0 - pair[0].1) / 1_000_000).collect();
+    println!("pauses {pauses:?} ms");
+    // The stretched beat alone would wait for twelve seconds; a second is what a busy test machine may add at this speed.
+    assert!(pauses.iter().all(|pause_ms| *pause_ms < 3_000), "{pauses:?} ms");
+    assert!(pauses[..4].iter().all(|pause_ms| *pause_ms > 1_500), "a slow control is not hurried: {pauses:?} ms");
 }

@@ -206,6 +206,13 @@ const CORE: &[ConfigKey] = &[
         "轮询超时（秒）",
     ),
     new_key(
+        ("source", "stand_in"),
+        Text,
+        Optional,
+        "Channels that it delivers while an earlier source that delivers them has no value: \"total_power_w supply_voltage_v\"; default: none",
+        "当前面的数据源没有值时，由本数据源代为提供的通道；默认：无",
+    ),
+    new_key(
         ("alignment", "spindle_power"),
         OneOf(&["off", "show", "merge"]),
         Default("\"show\""),

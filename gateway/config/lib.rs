@@ -19,11 +19,12 @@ mod keys_of_thermal;
 mod outputs;
 mod problem;
 mod read;
+mod stand_in;
 
 pub use in_force::InForce;
 pub use problem::Problem;
 
-use adapters::{Address, Axis};
+use adapters::{Address, Axis, ChannelId};
 use gateway_base::log::LogFormat;
 pub use gateway_gate::limits::{GateConfig, GateMode, OffsetConfig};
 use gateway_history::OutboxSettings;
@@ -105,6 +106,8 @@ pub struct SourceConfig {
     pub period: Option<Duration>,
     /// A poll that takes longer has failed.
     pub deadline: Duration,
+    /// Channels that it may deliver while an earlier source that delivers them has no value.
+    pub stand_in: Vec<ChannelId>,
 }
 
 /// What is done with the lag between the controller and a meter.

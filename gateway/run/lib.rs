@@ -51,6 +51,7 @@ use gateway_http::{
 };
 use gateway_pipeline::Pipeline;
 use gateway_sources::open::{self, MachineSpeed, Sources};
+use gateway_sources::origin_log::OriginLog;
 use gateway_status::alignment;
 use health::Health;
 use history_store::HistoryStore;
@@ -283,6 +284,7 @@ fn build_ticker(
             identity,
             schedule: pace,
             feed,
+            origins: OriginLog::default(),
             pipeline,
             commands,
             energy: EnergyCounter::default(),

@@ -1,11 +1,12 @@
 //! From the pipeline's figures to the status document.
 
 use adapters::clock::{SECOND_NS, TimeNs};
-use adapters::{Axis, Sample, Slot, Value};
+use adapters::{Axis, ChannelId, Sample, Slot, Value};
 use gateway_config::GateMode;
 use gateway_gate::{Gate, GateOutcome, Verdict};
 use gateway_http::ESTIMATES;
 use gateway_pipeline::Pipeline;
+use gateway_sources::sample_feed::SampleFeed;
 use gateway_status::{
     AlarmStatus, AxisShift, ChannelStatus, DecisionStatus, EstimateStatus, GateStatus, NumberOrWord, OffsetStatus,
     ScriptStatus, StateStatus,
@@ -26,20 +27,21 @@ fn to_seconds(ns: i64) -> f64 {
     ns as f64 / SECOND_NS as f64
 }
 
-/// Every channel that a source provides, with value, unit and age.
+/// Every channel that a source provides, with value, unit, age and source.
 #[must_use]
-pub fn list_channels(sample: &Sample) -> Vec<ChannelStatus> {
-    sample.provided_slots().map(|(id, slot)| build_channel_status(id.name(), id.channel().unit, slot)).collect()
+pub fn list_channels(sample: &Sample, feed: &SampleFeed) -> Vec<ChannelStatus> {
+    sample.provided_slots().map(|(id, slot)| build_channel_status(id, slot, feed.find_origin_name(id))).collect()
 }
 
-fn build_channel_status(name: &'static str, unit: &'static str, slot: &Slot) -> ChannelStatus {
+fn build_channel_status(id: ChannelId, slot: &Slot, origin: Option<&str>) -> ChannelStatus {
     let (value, missing) = match &slot.value {
         Ok(Value::Number(number)) => (Some(NumberOrWord::Number(*number)), None),
         Ok(Value::Text(text)) => (Some(NumberOrWord::Text(text.to_string())), None),
         Err(absence) => (None, Some(absence.as_word())),
     };
     let age_s = value.is_some().then(|| to_seconds(slot.age_ns));
-    ChannelStatus { name, value, unit, age_s, missing }
+    let source = origin.filter(|_| value.is_some()).map(str::to_owned);
+    ChannelStatus { name: id.name(), value, unit: id.channel().unit, age_s, missing, source }
 }
 
 /// Figures without a standard deviation that are shown: of the load, and the witnesses of the wear.

@@ -22,6 +22,7 @@ use gateway_gate::{Disarmed, ScriptRequest};
 use gateway_http::Published;
 use gateway_pipeline::Pipeline;
 use gateway_sinks::Board;
+use gateway_sources::origin_log::OriginLog;
 use gateway_sources::pace::TickSchedule;
 use gateway_sources::sample_feed::SampleFeed;
 use gateway_status::{AlarmStatus, HistoryStatus, Status, StatusProblem, TickStatus};
@@ -75,6 +76,8 @@ pub struct Ticker {
     pub schedule: TickSchedule,
     /// Gives the samples of the ticks.
     pub feed: SampleFeed,
+    /// Which source each channel was last told to come from.
+    pub origins: OriginLog,
     /// Infers, decides and records with each sample.
     pub pipeline: Pipeline,
     /// Orders, audit, and the worker that writes.
@@ -133,6 +136,7 @@ impl Ticker {
             let began_ns = *first_ns.get_or_insert(now_ns);
             let alive = self.feed.sample_into(&mut sample, now_ns);
             self.energy.count_tick(&sample);
+            self.tell_origins(sample.at_ns);
             self.fill_from_recipe(&mut sample, now_ns);
             self.scripts.apply_changes(&mut self.pipeline, &mut self.health, &self.run_flags, (now_ns, sample.at_ns));
             if self.disarm_for_broken_threads(&sample) {
@@ -208,6 +212,13 @@ impl Ticker {
         })
     }
 
+    /// A channel that comes from another source than before is told.
+    fn tell_origins(&mut self, at_ns: TimeNs) {
+        for notice in self.feed.tell_origins(&mut self.origins, at_ns) {
+            self.health.record_event(at_ns, "sources", &notice);
+        }
+    }
+
     /// What the simulated controllers have counted, for whoever does not believe the gateway's own figures.
     fn tell_writes(&mut self, at_ns: TimeNs) {
         for machine in &self.machines {
@@ -255,7 +266,7 @@ impl Ticker {
                 skipped: self.schedule.skipped_ticks(),
             },
             state: report::build_state_status(&self.pipeline),
-            channels: report::list_channels(sample),
+            channels: report::list_channels(sample, &self.feed),
             estimates: report::list_estimates(self.pipeline.estimates()),
             alarms,
             acknowledged,

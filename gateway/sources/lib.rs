@@ -2,6 +2,8 @@
 
 pub mod doctor;
 pub mod open;
+pub mod origin_log;
 pub mod pace;
 pub mod sample_feed;
+mod stand_in;
 pub mod waveform;

@@ -2,6 +2,7 @@
 
 use super::pace::TickSchedule;
 use super::sample_feed::SampleFeed;
+use super::stand_in::declare_stand_ins;
 use adapters::address::Target;
 use adapters::clock::{Clock, TimeNs};
 use adapters::merge::{Delay, Lockstep, Merge, SourcePlan};
@@ -108,7 +109,11 @@ fn open_live_sources(config: &Config, clock: &Arc<dyn Clock>) -> Result<Sources,
         return Err(problems);
     }
     let written = find_written_source(&config.gate);
-    let feed = start_workers(found, clock, &config.alignment, |plans| reserve_evidence(plans, &owners, written))
+    let mut plans: Vec<SourcePlan> =
+        found.iter().map(|(source, settings)| plan_live_source(source.as_ref(), settings)).collect();
+    declare_stand_ins(&mut plans, &owners, &config.sources)?;
+    reserve_evidence(&mut plans, &owners, written);
+    let feed = start_workers(found, &plans, clock, &config.alignment)
         .map_err(|error| vec![format!("no thread for a source: {error}")])?;
     let pace = TickSchedule::on_clock(clock.clone(), tick_period(config));
     Ok(Sources { feed, schedule: pace, ways, machines, simulated: is_simulated(config) })
@@ -142,30 +147,30 @@ fn reserve_evidence(plans: &mut [SourcePlan], owners: &[&str], written: Option<&
     }
 }
 
+fn plan_live_source(source: &dyn Source, settings: &WorkerSettings) -> SourcePlan {
+    let plan = SourcePlan::from_source(source);
+    SourcePlan { period: settings.period.unwrap_or(plan.period), ..plan }
+}
+
 fn start_workers(
     sources: Vec<(Box<dyn Source>, WorkerSettings)>,
+    plans: &[SourcePlan],
     clock: &Arc<dyn Clock>,
     alignment: &config::AlignmentConfig,
-    reserve: impl FnOnce(&mut [SourcePlan]),
 ) -> std::io::Result<SampleFeed> {
-    let plan = |(source, settings): &(Box<dyn Source>, WorkerSettings)| {
-        let plan = SourcePlan::from_source(source.as_ref());
-        SourcePlan { period: settings.period.unwrap_or(plan.period), ..plan }
-    };
-    let mut plans: Vec<SourcePlan> = sources.iter().map(plan).collect();
-    reserve(&mut plans);
-    let merge = Merge::new(&plans, Delay::SlowestPeriod);
+    let merge = Merge::new(plans, Delay::SlowestPeriod);
     let start = |(source, settings)| Worker::start(source, clock.clone(), settings);
     let workers = sources.into_iter().map(start).collect::<Result<_, _>>()?;
-    Ok(SampleFeed::Threads { workers, merge, alignment: Alignment::from_plans(&plans, alignment, Patience::GoesOn) })
+    Ok(SampleFeed::Threads { workers, merge, alignment: Alignment::from_plans(plans, alignment, Patience::GoesOn) })
 }
 
 fn open_stepped_sources(config: &Config, speed: MachineSpeed, start_ns: TimeNs) -> Result<Sources, Vec<String>> {
     let (mut found, mut ways, mut problems) = (Vec::<Box<dyn Pull>>::new(), Vec::new(), Vec::new());
-    let mut machines = Vec::new();
+    let (mut machines, mut owners) = (Vec::new(), Vec::new());
     for source in &config.sources {
         match open_pull(&source.address, start_ns) {
             Ok(opened) => {
+                owners.extend(opened.sources.iter().map(|_| source.name.as_str()));
                 found.extend(opened.sources);
                 let (name, actuator, offsets) = (source.name.clone(), opened.actuator, opened.offsets);
                 ways.push(Way { name, actuator, offsets });
@@ -178,9 +183,11 @@ fn open_stepped_sources(config: &Config, speed: MachineSpeed, start_ns: TimeNs) 
         return Err(problems);
     }
     let names = found.iter().map(|source| (source.name().to_owned(), source.period())).collect();
-    let plans: Vec<SourcePlan> = found.iter().map(|source| SourcePlan::of_pull(source.as_ref())).collect();
+    let mut plans: Vec<SourcePlan> = found.iter().map(|source| SourcePlan::of_pull(source.as_ref())).collect();
+    declare_stand_ins(&mut plans, &owners, &config.sources)?;
     let alignment = Alignment::from_plans(&plans, &config.alignment, Patience::Waits);
-    let feed = SampleFeed::Stepped { lockstep: Lockstep::new(found, Delay::SlowestPeriod), sources: names, alignment };
+    let lockstep = Lockstep::from_plans(found, &plans, Delay::SlowestPeriod);
+    let feed = SampleFeed::Stepped { lockstep, sources: names, alignment };
     let pace = TickSchedule::with_speed(speed.time_factor(), start_ns, tick_period(config));
     Ok(Sources { feed, schedule: pace, ways, machines, simulated: is_simulated(config) })
 }
@@ -199,6 +206,7 @@ mod tests {
             name: name.to_owned(),
             channels: channels.iter().map(|name| ChannelId::from_name(name).expect("in the table")).collect(),
             period: Duration::from_millis(100),
+            stand_in: Vec::new(),
         };
         let all = || {
             [plan("simulated://lathe", &["mode", "alarm", "spindle_power_w", "dry_run"]), plan("c", &["mode", "alarm"])]

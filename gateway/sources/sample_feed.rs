@@ -1,10 +1,12 @@
 //! Where samples come from: sources on their own threads for a real machine, sources in step for an accelerated one.
 
+use super::origin_log::OriginLog;
 use adapters::clock::TimeNs;
 use adapters::histogram::Histogram;
 use adapters::merge::{Lockstep, Merge, MergeCounts, SourceId};
 use adapters::worker::{Poll, Worker, WorkerState, WorkerStats};
-use adapters::{Fact, FactValue, Sample, SourceError, SourceProblem};
+use adapters::{ChannelId, Fact, FactValue, Sample, SourceError, SourceProblem};
+use gateway_base::log::Notice;
 use gateway_status::alignment::Alignment;
 use gateway_status::{FactStatus, NumberOrWord, SourceStatus, StatusProblem};
 use std::time::Duration;
@@ -92,9 +94,47 @@ impl SampleFeed {
         }
     }
 
+    fn merge(&self) -> &Merge {
+        match self {
+            Self::Threads { merge, .. } => merge,
+            Self::Stepped { lockstep, .. } => lockstep.merge(),
+        }
+    }
+
+    /// Which channels have begun to come from another source.
+    pub fn tell_origins(&self, log: &mut OriginLog, at_ns: TimeNs) -> Vec<Notice> {
+        log.take_notices(self.merge(), at_ns, |source| self.name_of(source).to_owned())
+    }
+
+    /// The name of the source that a channel has its value from.
+    #[must_use]
+    pub fn find_origin_name(&self, channel: ChannelId) -> Option<&str> {
+        self.merge().find_current_source(channel).map(|source| self.name_of(source))
+    }
+
+    fn name_of(&self, source: SourceId) -> &str {
+        match self {
+            Self::Threads { workers, .. } => workers.get(source.0).map_or("", Worker::name),
+            Self::Stepped { sources, .. } => sources.get(source.0).map_or("", |(name, _)| name.as_str()),
+        }
+    }
+
+    /// Channels of each source that are not taken from it.
+    fn list_unused(&self, source: usize) -> Vec<&'static str> {
+        self.merge().list_unused_channels(SourceId(source)).map(ChannelId::name).collect()
+    }
+
     /// How each source is doing.
     #[must_use]
     pub fn list_sources(&self, now_ns: TimeNs) -> Vec<SourceStatus> {
+        let mut sources = self.list_source_conditions(now_ns);
+        for (index, source) in sources.iter_mut().enumerate() {
+            source.unused_channels = self.list_unused(index);
+        }
+        sources
+    }
+
+    fn list_source_conditions(&self, now_ns: TimeNs) -> Vec<SourceStatus> {
         match self {
             Self::Threads { workers, merge, .. } => {
                 let each = workers.iter().enumerate();
@@ -157,6 +197,7 @@ fn of_worker(name: &str, stats: &WorkerStats, counts: MergeCounts) -> SourceStat
         dropped: count_dropped(counts) + stats.dropped,
         facts: stats.facts.iter().map(to_fact_status).collect(),
         problems: stats.problems.iter().map(to_status_problem).collect(),
+        unused_channels: Vec::new(),
     }
 }
 
@@ -197,5 +238,6 @@ fn of_step(name: &str, period: Duration, error: Option<&SourceError>, counts: Me
         dropped: count_dropped(counts),
         facts: Vec::new(),
         problems: Vec::new(),
+        unused_channels: Vec::new(),
     }
 }

@@ -36,6 +36,9 @@ pub struct ChannelStatus {
     /// Why there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<&'static str>,
+    /// The source that delivered the value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
 }
 
 /// One inferred quantity: a value with its uncertainty, or the reason for none.
@@ -216,6 +219,9 @@ pub struct SourceStatus {
     /// What is wrong although it answers.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub problems: Vec<StatusProblem>,
+    /// Channels that it delivers and that are not taken from it: they belong to an earlier source, for which it does not stand in.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unused_channels: Vec<&'static str>,
 }
 
 /// A script and whether its newest text is in charge.

@@ -14,6 +14,9 @@
 //! | cutting | settled, feed on, evidence for load against the no-load power; ends without feed or evidence |
 //! | unknown | nothing measures the load and the feed is on, an input is missing for longer than `dropout_hold_s`, inputs contradict each other, or the feed is on and no no-load power is known |
 //!
+//! A spindle that turns when it is first seen, or is seen again after a control did not answer, has not started: it is idle where nothing is fed,
+//! rapid in rapid traverse, and unknown under feed until a no-load power is known.
+//!
 //! Settled means: the power lies at the known no-load power, or two windows agree and are stationary. A spindle that is
 //! already under load when the gateway starts settles only against a table; otherwise cutting is not claimed.
 
@@ -175,7 +178,8 @@ impl Detector {
     }
 
     fn at_rest(&mut self, state: State, tick: &Tick<'_>) -> Detected {
-        self.enter_phase(Phase::Rest, tick.inputs.at_ns);
+        let phase = if tick.is_rest_measured() { Phase::Rest } else { Phase::Fresh };
+        self.enter_phase(phase, tick.inputs.at_ns);
         self.evidence.clear();
         report_state(state)
     }
@@ -241,8 +245,12 @@ impl Detector {
         if let Some((then_ns, before)) = self.settled_speed.replace((now_ns, speed)) {
             let pause_s = seconds_between(then_ns, now_ns);
             let allowed_rpm = HIDDEN_CHANGE * speed.abs().max(before.abs());
-            if (speed - before).abs() > allowed_rpm || pause_s > HIDDEN_STOP_S {
+            if (speed - before).abs() > allowed_rpm {
                 self.enter_phase(Phase::Changing, now_ns);
+                self.evidence.clear();
+            } else if pause_s > HIDDEN_STOP_S {
+                // Neither a change nor a start was seen: nothing is known of what happened meanwhile.
+                self.enter_phase(Phase::Fresh, now_ns);
                 self.evidence.clear();
             }
         }
@@ -254,8 +262,27 @@ impl Detector {
         match self.phase {
             Phase::Starting if !overdue || tick.classify_feed() == Feed::Off => report_state(State::SpindleStart),
             Phase::Changing if !overdue || tick.classify_feed() == Feed::Off => report_state(State::SpeedChange),
-            _ => report_unknown(tick.no_load.err().unwrap_or(NoEstimate::NotSettled)),
+            _ => self.judge_fresh_spindle(tick),
         }
+    }
+
+    /// A spindle that turned already when it was first seen, without a no-load power to compare with. At a steady speed it idles where
+    /// nothing is fed, and in rapid traverse it does not cut; what it does under feed is not known.
+    fn judge_fresh_spindle(&self, tick: &Tick<'_>) -> Detected {
+        let reason = tick.no_load.err().unwrap_or(NoEstimate::NotSettled);
+        let steady = tick.signals.is_speed_steady(Pace::Settling, tick.settings) == Some(true);
+        match (self.phase, tick.classify_feed()) {
+            (Phase::Fresh, Feed::Off) if steady && tick.no_load.is_err() => report_state(State::Idle),
+            (Phase::Fresh, Feed::On) if steady && tick.no_load.is_err() && tick.inputs.rapid => {
+                report_state(State::Rapid)
+            }
+            _ => report_unknown(reason),
+        }
+    }
+
+    /// Idle, rapid or cutting with a power that has settled: before that, idling says nothing of no-load power.
+    pub(super) fn runs_settled(&self) -> bool {
+        self.phase == Phase::Settled && matches!(self.state, State::Idle | State::Rapid | State::Cutting)
     }
 
     fn attempt_settling(&mut self, tick: &Tick<'_>) -> Detected {

@@ -53,6 +53,14 @@ impl Tick<'_> {
         }
     }
 
+    /// Does anything measured say that the spindle stands? A control that does not answer says nothing of its spindle: without a meter at its
+    /// standby the spindle may turn on.
+    pub(super) fn is_rest_measured(&self) -> bool {
+        let at_standby =
+            self.standby_w.is_some() && self.inputs.total.is_ok() && self.find_power_above_rest().is_none();
+        self.inputs.speed.is_ok() || self.is_powered() == Some(false) || at_standby
+    }
+
     /// Power of the whole machine, W, where it is visibly more than at rest. Before the machine was seen at rest that is whatever is
     /// not off.
     fn find_power_above_rest(&self) -> Option<f64> {

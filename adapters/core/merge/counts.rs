@@ -21,7 +21,7 @@ pub struct MergeCounts {
     pub unannounced: u64,
     /// Whole polls that failed.
     pub failures: u64,
-    /// Slots that this source filled because an earlier one in the list had no value.
+    /// Slots that this source filled as a stand-in, because the one that the channel belongs to had no value.
     pub stepped_in: u64,
 }
 

@@ -23,8 +23,14 @@ impl Lockstep {
     #[must_use]
     pub fn new(sources: Vec<Box<dyn Pull>>, delay: Delay) -> Self {
         let plans: Vec<SourcePlan> = sources.iter().map(|source| SourcePlan::of_pull(source.as_ref())).collect();
+        Self::from_plans(sources, &plans, delay)
+    }
+
+    /// The same with plans that say who stands in for whom, one for each source in the same order.
+    #[must_use]
+    pub fn from_plans(sources: Vec<Box<dyn Pull>>, plans: &[SourcePlan], delay: Delay) -> Self {
         let sources = sources.into_iter().map(|source| Feed { source, last_error: None }).collect();
-        Self { sources, merge: Merge::new(&plans, delay), readings: Vec::new() }
+        Self { sources, merge: Merge::new(plans, delay), readings: Vec::new() }
     }
 
     /// When the next answer of any source arrives; `None` when all have ended. A recording is sampled row by row by

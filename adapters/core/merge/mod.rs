@@ -8,6 +8,10 @@
 //! A source may deliver late and out of order: a reading that still matters is put in its place, one that does not is
 //! counted and dropped. A poll that failed ends the freshness of its source: what came before it is not held any longer. Where a clock steps, readings stamped by the wrong clock are dropped and counted.
 //!
+//! Where several sources deliver a channel, it belongs to the first of them that has it at all. Another one takes its place only where
+//! its plan says so ([`SourcePlan::stand_in`]); else the channel is absent for the reason of the one it belongs to. [`Merge::find_origin`]
+//! tells where the newest value came from.
+//!
 //! A source whose readings were true some time before their stamps (a meter that averages and transmits) is told so by
 //! [`Merge::set_lag_ns`]; its stamps are shifted and every tick looks back further by as much.
 //!
@@ -15,13 +19,18 @@
 //! tick once its rings have their size.
 
 mod counts;
+mod lane;
 mod lockstep;
 mod track;
+
+#[cfg(test)]
+mod origin_tests;
 
 #[cfg(test)]
 mod properties;
 
 pub use counts::MergeCounts;
+pub use lane::Origin;
 pub use lockstep::Lockstep;
 
 use crate::channel::{ChannelId, Kind};
@@ -29,8 +38,8 @@ use crate::clock::TimeNs;
 use crate::driver::{Pull, Source, SourceError};
 use crate::integer::{convert_bounded, saturate_to_wait_ns, widen_to_usize};
 use crate::reading::{Absence, Reading};
-use crate::sample::{Sample, Slot};
-use std::ops::Range;
+use crate::sample::Sample;
+use lane::Lane;
 use std::time::Duration;
 use track::{PeriodLimits, Put, ReadingTrack};
 
@@ -47,19 +56,25 @@ pub struct SourcePlan {
     pub channels: Vec<ChannelId>,
     /// From one poll to the next, as the source promises it.
     pub period: Duration,
+    /// Those of its channels that it may deliver while the source that they belong to has no value.
+    pub stand_in: Vec<ChannelId>,
 }
 
 impl SourcePlan {
     /// The plan of a live source.
     #[must_use]
     pub fn from_source(source: &dyn Source) -> Self {
-        Self { name: source.name().to_owned(), channels: source.channels().to_vec(), period: source.period() }
+        Self::without_stand_in(source.name(), source.channels(), source.period())
     }
 
     /// The plan of a source that brings its own time.
     #[must_use]
     pub fn of_pull(source: &dyn Pull) -> Self {
-        Self { name: source.name().to_owned(), channels: source.channels().to_vec(), period: source.period() }
+        Self::without_stand_in(source.name(), source.channels(), source.period())
+    }
+
+    fn without_stand_in(name: &str, channels: &[ChannelId], period: Duration) -> Self {
+        Self { name: name.to_owned(), channels: channels.to_vec(), period, stand_in: Vec::new() }
     }
 }
 
@@ -107,12 +122,6 @@ impl Failure {
     }
 }
 
-/// The tracks of one channel, in the order of the sources.
-struct Lane {
-    channel: ChannelId,
-    tracks: Range<usize>,
-}
-
 const NO_TRACK: u32 = u32::MAX;
 
 /// Readings in, samples out. See the [module](self).
@@ -130,8 +139,7 @@ pub struct Merge {
 }
 
 impl Merge {
-    /// A merge of these sources. Where several deliver a channel, the first one in the list wins as long as it has a
-    /// value.
+    /// A merge of these sources, in the order of precedence.
     #[must_use]
     pub fn new(plans: &[SourcePlan], delay: Delay) -> Self {
         let delay_ns = delay_of(plans, delay);
@@ -162,13 +170,15 @@ impl Merge {
 
     fn add_lane(&mut self, plans: &[SourcePlan], channel: ChannelId) {
         let first = self.tracks.len();
-        for (source, _) in plans.iter().enumerate().filter(|(_, plan)| plan.channels.contains(&channel)) {
+        for (source, plan) in plans.iter().enumerate().filter(|(_, plan)| plan.channels.contains(&channel)) {
             let track = self.tracks.len();
             self.lookup[source * self.channels + channel.index()] = convert_bounded(track, NO_TRACK);
-            self.tracks.push(ReadingTrack::new(channel, source, self.sources[source].period_limits));
+            let mut track = ReadingTrack::new(channel, source, self.sources[source].period_limits);
+            track.stands_in = plan.stand_in.contains(&channel);
+            self.tracks.push(track);
         }
         if self.tracks.len() > first {
-            self.lanes.push(Lane { channel, tracks: first..self.tracks.len() });
+            self.lanes.push(Lane { channel, tracks: first..self.tracks.len(), origin: None, has_value: false });
         }
     }
 
@@ -243,10 +253,39 @@ impl Merge {
         }
         self.last_tick_ns = at_ns;
         sample.at_ns = at_ns;
-        for lane in &self.lanes {
-            let slot = choose_slot(&mut self.tracks[lane.tracks.clone()], &mut self.sources, at_ns);
+        for lane in &mut self.lanes {
+            let slot = lane.choose_slot(&mut self.tracks, &mut self.sources, at_ns);
             sample.set_slot(lane.channel, slot);
         }
+    }
+
+    /// Where the newest value of a channel came from; `None` before the first one.
+    #[must_use]
+    pub fn find_origin(&self, channel: ChannelId) -> Option<Origin> {
+        self.find_lane(channel)?.origin
+    }
+
+    /// The source of the value that a channel had at the newest tick; `None` where it had none.
+    #[must_use]
+    pub fn find_current_source(&self, channel: ChannelId) -> Option<SourceId> {
+        let lane = self.find_lane(channel).filter(|lane| lane.has_value)?;
+        lane.origin.map(|origin| origin.source)
+    }
+
+    /// The lanes are in the order of the table.
+    fn find_lane(&self, channel: ChannelId) -> Option<&Lane> {
+        let at = self.lanes.binary_search_by_key(&channel.index(), |lane| lane.channel.index()).ok()?;
+        self.lanes.get(at)
+    }
+
+    /// The channels that more than one source delivers.
+    pub fn list_shared_channels(&self) -> impl Iterator<Item = ChannelId> {
+        self.lanes.iter().filter(|lane| lane.tracks.len() > 1).map(|lane| lane.channel)
+    }
+
+    /// Channels that this source delivers and that are not taken from it, now and while the source that they belong to has no value either.
+    pub fn list_unused_channels(&self, source: SourceId) -> impl Iterator<Item = ChannelId> {
+        self.lanes.iter().filter(move |lane| lane.leaves_out(source, &self.tracks)).map(|lane| lane.channel)
     }
 
     fn step_back(&mut self, at_ns: TimeNs) {
@@ -266,37 +305,6 @@ impl Merge {
     #[must_use]
     pub fn tick_steps(&self) -> u64 {
         self.tick_steps
-    }
-}
-
-/// The first source with a value wins; without any, the reason of the first one stands.
-fn choose_slot(tracks: &mut [ReadingTrack], sources: &mut [SourceState], at_ns: TimeNs) -> Slot {
-    let mut reason: Option<Slot> = None;
-    for track in tracks {
-        let state = &mut sources[track.source];
-        let slot = explain_absence(track.evaluate_at(at_ns, state.period_limits.gap_ns), state.failure, at_ns);
-        if slot.value.is_ok() {
-            state.counts.stepped_in += u64::from(reason.is_some());
-            return slot;
-        }
-        reason.get_or_insert(slot);
-    }
-    reason.unwrap_or_else(|| Slot::from_absence(Absence::NotProvided))
-}
-
-/// Replaces "stale" and "not yet read" by what the source itself said. A poll that failed ends the freshness of what came
-/// before it: nothing is known from its end until the next answer. A number between two answers was measured on either
-/// side and stays.
-fn explain_absence(slot: Slot, failure: Option<Failure>, at_ns: TimeNs) -> Slot {
-    let Some(failure) = failure.filter(|failure| !failure.ended_by(at_ns)) else { return slot };
-    match slot.value {
-        Err(Absence::Stale | Absence::NotYetRead) if failure.after_ns <= at_ns => {
-            Slot { value: Err(failure.reason), age_ns: slot.age_ns }
-        }
-        Ok(_) if failure.since_ns <= at_ns && slot.age_ns > 0 => {
-            Slot { value: Err(failure.reason), age_ns: slot.age_ns }
-        }
-        _ => slot,
     }
 }
 

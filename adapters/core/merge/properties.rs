@@ -32,6 +32,7 @@ fn build_merge() -> (Merge, ChannelId) {
         name: "a".into(),
         channels: vec![channel],
         period: Duration::from_nanos(PERIOD_NS.unsigned_abs()),
+        stand_in: Vec::new(),
     };
     (Merge::new(&[plan], Delay::default()), channel)
 }

@@ -15,6 +15,7 @@ fn plan(name: &str, channels: &[&str], period_ms: u64) -> SourcePlan {
         name: name.to_owned(),
         channels: channels.iter().map(|name| channel(name)).collect(),
         period: Duration::from_millis(period_ms),
+        stand_in: Vec::new(),
     }
 }
 
@@ -142,21 +143,6 @@ fn a_tick_that_goes_back_is_counted_and_survived() {
 }
 
 #[test]
-fn the_first_configured_source_wins_while_it_has_a_value() {
-    let plans = [plan("a", &["spindle_power_w"], 100), plan("b", &["spindle_power_w"], 100)];
-    let mut merge = Merge::new(&plans, Delay::default());
-    merge.push(SourceId(0), number("spindle_power_w", 0, 1.0));
-    for at_ms in [0, 100, 200, 300] {
-        merge.push(SourceId(1), number("spindle_power_w", at_ms, 2.0));
-    }
-    let power = |merge: &mut Merge, at_ms| at(merge, at_ms).number(channel("spindle_power_w"));
-    assert_eq!(power(&mut merge, 100), Ok(1.0));
-    assert_eq!(power(&mut merge, 300), Ok(2.0));
-    assert_eq!(power(&mut merge, 900), Err(Absence::Stale));
-    assert_eq!(merge.counts(SourceId(1)).stepped_in, 1);
-}
-
-#[test]
 fn words_hold_and_unannounced_channels_are_counted() {
     let mut merge = one();
     merge.push(SourceId(0), Reading::from_text(channel("program"), Stamp::from_exact_time(0), Arc::from("O1001")));
@@ -189,7 +175,12 @@ fn a_slower_source_than_promised_can_be_told() {
 #[test]
 fn a_source_that_lags_is_put_back_to_its_time() {
     let power = ChannelId::from_name("spindle_power_w").expect("in the table");
-    let plan = SourcePlan { name: "meter".to_owned(), channels: vec![power], period: Duration::from_millis(100) };
+    let plan = SourcePlan {
+        name: "meter".to_owned(),
+        channels: vec![power],
+        period: Duration::from_millis(100),
+        stand_in: vec![],
+    };
     let mut merge = Merge::new(&[plan], Delay::SlowestPeriod);
     let plain_ns = merge.delay_ns();
     let (mut sample, mut last_ns, mut error) = (Sample::new_empty(0), i64::MIN, f64::INFINITY);

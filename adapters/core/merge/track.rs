@@ -56,6 +56,11 @@ pub(super) struct ReadingTrack {
     electric: bool,
     /// Position of the source in the merge's list.
     pub(super) source: usize,
+    /// May its source deliver the channel while the one that the channel belongs to has no value?
+    pub(super) stands_in: bool,
+    /// Whether the source has the channel at all; `None` until it said so by a value or by [`Absence::NotSupported`]. A value once seen is
+    /// proof for good: what is refused later is a fault and no other device.
+    has_channel: Option<bool>,
     points: VecDeque<TrackPoint>,
     depth: usize,
 }
@@ -64,7 +69,13 @@ impl ReadingTrack {
     pub(super) fn new(channel: ChannelId, source: usize, pace: PeriodLimits) -> Self {
         let continuous = channel.channel().kind == Kind::Continuous;
         let electric = channel.channel().is_electric();
-        Self { continuous, electric, source, points: VecDeque::with_capacity(pace.depth), depth: pace.depth }
+        let points = VecDeque::with_capacity(pace.depth);
+        Self { continuous, electric, source, stands_in: false, has_channel: None, points, depth: pace.depth }
+    }
+
+    /// Has its source said that the device does not have the channel, and never delivered a value?
+    pub(super) fn lacks_channel(&self) -> bool {
+        self.has_channel == Some(false)
     }
 
     /// Stamp of the newest reading.
@@ -80,6 +91,11 @@ impl ReadingTrack {
         last_tick_ns: TimeNs,
         pace: &PeriodLimits,
     ) -> Put {
+        match &value {
+            Ok(_) => self.has_channel = Some(true),
+            Err(Absence::NotSupported) => self.has_channel = Some(self.has_channel == Some(true)),
+            Err(_) => {}
+        }
         let Some(last_ns) = self.last_ns().filter(|last_ns| mid_ns <= *last_ns) else {
             return self.insert(self.points.len(), TrackPoint { mid_ns, value }, Put::Newest);
         };

@@ -9,6 +9,7 @@ use fanuc::address::parse_fanuc;
 use fanuc::item::Area;
 use fanuc::line::FanucLine;
 use fanuc::open::{OpenedFanuc, open_native};
+use fanuc::wire::Number;
 use fanuc::work_offset::ExternalOffsets;
 use simulated::{Simulated, SimulatedSettings};
 use std::net::TcpListener;
@@ -280,4 +281,37 @@ fn what_is_not_allowed_is_not_sent() {
     let error = offsets.write(&SystemClock::new(), Axis::X, 0.0, 3.0).expect_err("not on the list").to_string();
     assert!(error.contains("allow="), "{error}");
     assert_eq!(server.with(|control| control.map(|control| control.writes)), Some(0));
+}
+
+/// Of every axis and of every spindle: the load meter shows an amount.
+#[test]
+fn no_load_has_a_sign() {
+    let mut control = Controller::new(4, &['X', 'Y', 'Z', 'B']);
+    let negative = |value| Number::from_decimal(value, 0);
+    control.spindles[0].quantities[4] = negative(-41);
+    control.spindles.push(control.spindles[0].clone());
+    control.spindles[1].quantities[4] = negative(-7);
+    for (axis, load) in control.axes.iter_mut().zip([-31, 52, -118, -9]) {
+        axis.load = negative(load);
+    }
+    let server = serve(Box::new(control));
+    let mut opened = opened(&server, "spindles=2&axes=B");
+    let (clock, mut readings) = (SystemClock::new(), Vec::new());
+    opened.sources[0].read(&clock, &mut readings).expect("answers");
+    let loads: Vec<(&str, f64)> = readings
+        .iter()
+        .filter(|reading| reading.channel.name().ends_with("load_pct"))
+        .map(|reading| {
+            (reading.channel.name(), reading.value.as_ref().expect("a value").as_number().expect("a number"))
+        })
+        .collect();
+    let expected = [
+        ("spindle_load_pct", 41.0),
+        ("x_axis_load_pct", 31.0),
+        ("y_axis_load_pct", 52.0),
+        ("z_axis_load_pct", 118.0),
+        ("b_axis_load_pct", 9.0),
+        ("spindle2_load_pct", 7.0),
+    ];
+    assert_eq!(loads, expected);
 }

@@ -9,7 +9,7 @@ use super::outputs;
 use super::read::{ConfigInput, LocatedValue, Origin, SectionValues};
 use super::{
     AlignmentConfig, AlignmentUse, Config, GateConfig, GateMode, GatewayConfig, HistoryConfig, LogConfig, OffsetConfig,
-    OperationsConfig, ScriptsConfig, SourceConfig, TwinConfig, channels,
+    OperationsConfig, ScriptsConfig, SourceConfig, TwinConfig, channels, stand_in,
 };
 use adapters::Axis;
 use adapters::address::{Target, WriteMethod};
@@ -29,6 +29,8 @@ pub(super) fn build_config(reading: &mut ConfigInput<'_>, base: &Path) -> Option
     let sources = sources.map(|mut sources| {
         let written = reading.sources.clone();
         sources.iter_mut().zip(&written).for_each(|(source, values)| channels::add(reading, source, values));
+        let each = sources.iter_mut().zip(&written).enumerate();
+        each.for_each(|(position, (source, values))| stand_in::add(reading, source, values, position));
         sources
     });
     let sinks = outputs::build_sinks(reading);
@@ -166,6 +168,7 @@ fn source(values: &SectionValues) -> Option<SourceConfig> {
         address,
         period: number("period_s").map(Duration::from_secs_f64),
         deadline: Duration::from_secs_f64(number("deadline_s")?),
+        stand_in: Vec::new(),
     })
 }
 

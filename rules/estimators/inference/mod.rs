@@ -169,7 +169,7 @@ impl Inference {
         }
     }
 
-    /// Noise, standby power, upper bound and idle learning follow the state.
+    /// Noise, standby power, upper bound and learning follow the state.
     fn update_memory(
         &mut self,
         inputs: &TickInputs,
@@ -218,7 +218,7 @@ impl Inference {
     fn learn_idle_power(&mut self, inputs: &TickInputs, no_load: Result<NoLoad, NoEstimate>, verdict: &Detected) {
         let memory = &mut self.state;
         let rested = memory.signals.worked_ago_s(inputs.at_ns) >= self.settings.learn_guard_s && inputs.feed.is_ok();
-        let running = matches!(verdict.state, State::Idle | State::Rapid | State::Cutting);
+        let running = memory.detector.runs_settled();
         let (Ok(power_w), Ok(speed_rpm), true) = (inputs.power, inputs.speed, running) else {
             memory.learner.discard_unconfirmed();
             return;

@@ -61,6 +61,48 @@ fn a_silent_controller_makes_it_unknown_and_a_machine_that_is_off_makes_it_off()
     assert_eq!(bed.hold(Now { total_w: None, ..silent }, 1.0).0, [State::Off]);
 }
 
+/// Whatever way a control goes silent, with and without a meter, for any time: its spindle, which turns on, is not seen to start.
+#[test]
+fn a_control_that_answers_again_at_the_same_speed_has_not_started_its_spindle() {
+    let reasons = [Absence::MachineOff, Absence::Timeout, Absence::Disconnected, Absence::Stale];
+    for (reason, seconds, known, meter) in reasons.into_iter().flat_map(|reason| {
+        [1.0, 3.0, 8.0, 60.0].into_iter().flat_map(move |seconds| {
+            [(true, true), (true, false), (false, true), (false, false)]
+                .map(|(known, meter)| (reason, seconds, known, meter))
+        })
+    }) {
+        let mut bed = if known { Bed::warmed_up() } else { Bed::new(Settings::default()) };
+        if !meter {
+            bed.lacks.push("total_power_w");
+        }
+        bed.reason = reason;
+        bed.hold(idle(), 3.0);
+        let silent = Now { speed_rpm: None, feed_mm_min: None, power_w: None, ..idle() };
+        bed.hold(silent, seconds);
+        let (states, _) = bed.hold(idle(), 5.0);
+        let wrong = |state: &State| matches!(state, State::SpindleStart | State::SpeedChange | State::Cutting);
+        assert!(!states.iter().any(wrong), "{reason} {seconds} s, learned {known}, meter {meter}: {states:?}");
+        assert_eq!(
+            states.last(),
+            Some(&State::Idle),
+            "{reason} {seconds} s, learned {known}, meter {meter}: {states:?}"
+        );
+    }
+}
+
+#[test]
+fn a_box_that_is_connected_while_the_machine_works_tells_what_the_motion_says() {
+    let mut bed = Bed::new(Settings::default());
+    let first_s = (1..=50).find(|_| bed.tick(idle()).state == State::Idle).expect("idle is told");
+    assert!(first_s <= 10, "{first_s} ticks of 0.1 s");
+    let mut bed = Bed::new(Settings::default());
+    let rapid = Now { rapid: true, ..Now::turning(800.0, 560.0).fed(8000.0) };
+    assert_eq!(bed.hold(rapid, 3.0).0, [State::Unknown, State::Rapid]);
+    assert_eq!(bed.hold(cut(), 10.0).0, [State::Unknown], "no claim under feed without a reference");
+    assert_eq!(bed.hold(idle(), 10.0).0.last(), Some(&State::Idle));
+    assert_eq!(bed.hold(cut(), 5.0).0.last(), Some(&State::Cutting), "learned at the first pause");
+}
+
 #[test]
 fn a_dead_meter_contradicts_a_turning_spindle() {
     let mut bed = Bed::warmed_up();
