@@ -2,9 +2,7 @@
 
 use super::cell::{Cell, Decimal};
 use super::column_builder::{ColumnBuilder, SeenText, parse_text_number};
-use super::convert::{
-    join_date_and_time, moment_of_cell, number_of, show_cell, to_nanoseconds, unix_ns, utc_or_local,
-};
+use super::convert::{join_date_and_time, moment_of_cell, number_of, show_cell, to_nanoseconds, unix_ns, utc_or_local};
 use super::error::{RecordingError, RowProblem};
 use super::head::Head;
 use super::limits::{CELLS_MAX, DESCRIBED_MAX, WORDS_BYTES_MAX};
