@@ -247,7 +247,7 @@ mod tests {
         Estimates { state: State::Cutting, cutting_power_w: Ok(estimate), ..Estimates::without_samples(0) }
     }
 
-    fn name(text: &str) -> SharedName {
+    fn share_name(text: &str) -> SharedName {
         Some(Arc::from(text))
     }
 
@@ -256,13 +256,13 @@ mod tests {
         let mut gathering = Gathering::default();
         gathering.add_step(
             &Estimates { state: State::Idle, ..Estimates::without_samples(0) },
-            (name("T1").as_ref(), None),
+            (share_name("T1").as_ref(), None),
             Some(300.0),
             4.0,
         );
-        gathering.add_step(&cutting(1000.0), (name("T1").as_ref(), None), Some(1300.0), 1.0);
-        gathering.add_step(&cutting(400.0), (name("T2").as_ref(), None), Some(700.0), 1.0);
-        gathering.add_step(&cutting(1300.0), (name("T1").as_ref(), None), None, 2.0);
+        gathering.add_step(&cutting(1000.0), (share_name("T1").as_ref(), None), Some(1300.0), 1.0);
+        gathering.add_step(&cutting(400.0), (share_name("T2").as_ref(), None), Some(700.0), 1.0);
+        gathering.add_step(&cutting(1300.0), (share_name("T1").as_ref(), None), None, 2.0);
         let detail = gathering.finish_part();
         assert_eq!(detail.seconds, BTreeMap::from([("cutting".to_owned(), 4.0), ("idle".to_owned(), 4.0)]));
         assert_eq!(detail.peak_power_w, Some(1300.0));
@@ -276,7 +276,9 @@ mod tests {
     #[test]
     fn a_part_with_endless_tools_stays_small() {
         let mut gathering = Gathering::default();
-        (0..1000).for_each(|at| gathering.add_step(&cutting(1.0), (name(&format!("T{at}")).as_ref(), None), None, 1.0));
+        (0..1000).for_each(|at| {
+            gathering.add_step(&cutting(1.0), (share_name(&format!("T{at}")).as_ref(), None), None, 1.0)
+        });
         assert_eq!(gathering.finish_part().tools.len(), TOOLS_MAX);
     }
 }

@@ -129,11 +129,11 @@ struct SeenRow<'a> {
 }
 
 impl<'a> SeenRow<'a> {
-    fn cell(&self, index: usize) -> Cell<'a> {
+    fn cell_at(&self, index: usize) -> Cell<'a> {
         self.cells.get(index).copied().unwrap_or(Cell::Empty)
     }
 
-    fn plain(&self, index: usize) -> Option<f64> {
+    fn plain_at(&self, index: usize) -> Option<f64> {
         self.plain.get(index).copied().flatten()
     }
 }
@@ -172,10 +172,10 @@ impl<'p> BlockBuilder<'p> {
     /// Takes the row as a whole or not at all.
     fn accept_row(&mut self, row: &SeenRow<'_>, done: &mut Assembled) {
         let line = row.line;
-        let has_time = self.plan.time.index.is_some_and(|index| row.cell(index) != Cell::Empty);
+        let has_time = self.plan.time.index.is_some_and(|index| row.cell_at(index) != Cell::Empty);
         self.rows += 1;
         // Of several clocks the shorter ones end earlier.
-        if !has_time && self.plan.columns.iter().all(|column| row.cell(column.index) == Cell::Empty) {
+        if !has_time && self.plan.columns.iter().all(|column| row.cell_at(column.index) == Cell::Empty) {
             return;
         }
         let time = match self.parse_time(row) {
@@ -192,12 +192,12 @@ impl<'p> BlockBuilder<'p> {
         std::mem::take(&mut self.problems).into_iter().for_each(|problem| done.record_refusal(problem));
         for builder in &mut self.columns {
             let index = builder.plan.index;
-            if let Err(reason) = builder.look_at(row.cell(index), row.plain(index)) {
+            if let Err(reason) = builder.look_at(row.cell_at(index), row.plain_at(index)) {
                 return done.record_refusal(RowProblem { line, column: Some(builder.plan.source.clone()), reason });
             }
         }
         for builder in &mut self.columns {
-            self.has_new_word |= builder.push(line, row.cell(builder.plan.index));
+            self.has_new_word |= builder.push(line, row.cell_at(builder.plan.index));
         }
         self.lines.push(stored_line);
         self.times.push(time);
@@ -234,9 +234,9 @@ impl<'p> BlockBuilder<'p> {
 
     fn parse_time(&self, row: &SeenRow<'_>) -> Result<RawTime, String> {
         let plan = &self.plan.time;
-        let cell = plan.index.map_or(Cell::Empty, |index| row.cell(index));
-        let plain = plan.index.and_then(|index| row.plain(index));
-        let part = plan.milliseconds.and_then(|index| number_of(row.cell(index)));
+        let cell = plan.index.map_or(Cell::Empty, |index| row.cell_at(index));
+        let plain = plan.index.and_then(|index| row.plain_at(index));
+        let part = plan.milliseconds.and_then(|index| number_of(row.cell_at(index)));
         let part_ns = part.map_or(0, |ms| to_nanoseconds(ms / 1e3));
         let time = match plan.kind {
             TimeKind::Step { step_s, start } => Some(step_time(self.rows - 1, step_s, start)),
@@ -259,7 +259,7 @@ impl<'p> BlockBuilder<'p> {
                     .filter(|moment| moment.date.is_some())
                     .and_then(|moment| utc_or_local(moment, order)),
                 (_, Some(date)) => {
-                    join_date_and_time(row.cell(date), cell, order).map(|at_ns| RawTime::Local(at_ns + part_ns))
+                    join_date_and_time(row.cell_at(date), cell, order).map(|at_ns| RawTime::Local(at_ns + part_ns))
                 }
             },
         };

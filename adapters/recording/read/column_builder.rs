@@ -46,10 +46,26 @@ pub(super) struct ColumnBuilder<'p> {
     loss: Loss,
     /// The number of the row that is looked at.
     row_number: Option<f64>,
+    /// What a number under a decimal point becomes, where that is all that is asked of a plain one.
+    plain: Option<PlainConversion>,
+    is_words: bool,
+}
+
+/// `factor * x + offset`
+#[derive(Debug, Clone, Copy)]
+struct PlainConversion {
+    factor: f64,
+    offset: f64,
 }
 
 impl<'p> ColumnBuilder<'p> {
     pub(super) fn new(plan: &'p PlannedColumn) -> Self {
+        let plain = match plan.kind {
+            PlannedKind::Numbers { decimal: Decimal::Point, factor, offset } if plan.cell_units.is_none() => {
+                Some(PlainConversion { factor, offset })
+            }
+            _ => None,
+        };
         Self {
             plan,
             numbers: Numbers::default(),
@@ -57,12 +73,18 @@ impl<'p> ColumnBuilder<'p> {
             words_bytes: 0,
             loss: Loss::default(),
             row_number: None,
+            plain,
+            is_words: plan.kind == PlannedKind::Words,
         }
     }
 
     /// Takes the number of a cell; a cell of a strict column that holds none and is not absent refuses its row.
     pub(super) fn look_at(&mut self, cell: Cell<'_>, plain: Option<f64>) -> Result<(), String> {
-        if self.plan.kind == PlannedKind::Words {
+        if self.is_words {
+            return Ok(());
+        }
+        if let (Some(number), Some(PlainConversion { factor, offset })) = (plain, self.plain) {
+            self.row_number = Some(number * factor + offset);
             return Ok(());
         }
         self.row_number = self.parse_number(cell, plain);
@@ -96,7 +118,7 @@ impl<'p> ColumnBuilder<'p> {
 
     /// Takes the cell that was looked at; true where it is a new word.
     pub(super) fn push(&mut self, line: u64, cell: Cell<'_>) -> bool {
-        if self.plan.kind == PlannedKind::Words {
+        if self.is_words {
             let owned;
             let text = match cell {
                 Cell::Text(text) if is_absent(text) => "",
@@ -141,6 +163,6 @@ impl<'p> ColumnBuilder<'p> {
     }
 
     pub(super) fn into_cells(self) -> Cells {
-        if self.plan.kind == PlannedKind::Words { Cells::Words(self.words) } else { Cells::Numbers(self.numbers) }
+        if self.is_words { Cells::Words(self.words) } else { Cells::Numbers(self.numbers) }
     }
 }

@@ -62,12 +62,41 @@ pub(super) struct ColumnSurvey {
     pub(super) word_examples: Vec<Example>,
     last_word: String,
     last_is_flag: bool,
-    /// Of the numbers, under a decimal point: least, greatest, whether each is the one before plus one.
-    pub(super) range: Option<(f64, f64)>,
-    first: Option<f64>,
-    last: Option<f64>,
-    pub(super) counts_rows: bool,
-    steps: u64,
+    numbers: NumberSeries,
+}
+
+/// What the numbers of a column are, one after the other, under a decimal point.
+#[derive(Debug, Clone, Copy)]
+struct NumberSeries {
+    count: u64,
+    first: f64,
+    last: f64,
+    least: f64,
+    greatest: f64,
+    /// Each was the one before plus one.
+    is_counting: bool,
+}
+
+impl Default for NumberSeries {
+    fn default() -> Self {
+        let (least, greatest) = (f64::INFINITY, f64::NEG_INFINITY);
+        Self { count: 0, first: 0.0, last: 0.0, least, greatest, is_counting: true }
+    }
+}
+
+impl NumberSeries {
+    #[expect(clippy::float_cmp, reason = "a row number is a whole number, exactly")]
+    fn record_number(&mut self, number: f64) {
+        if self.count == 0 {
+            self.first = number;
+        } else if self.is_counting {
+            self.is_counting = number == self.last + 1.0;
+        }
+        self.count += 1;
+        self.last = number;
+        self.least = self.least.min(number);
+        self.greatest = self.greatest.max(number);
+    }
 }
 
 impl ColumnSurvey {
@@ -82,9 +111,19 @@ impl ColumnSurvey {
 
     /// Mean step from one number to the next.
     pub(super) fn mean_step(&self) -> Option<f64> {
-        let (first, last) = self.first.zip(self.last)?;
+        let NumberSeries { count, first, last, .. } = self.numbers;
         #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
-        (self.steps > 0).then(|| (last - first) / self.steps as f64)
+        (count > 1).then(|| (last - first) / (count - 1) as f64)
+    }
+
+    /// Least and greatest number.
+    pub(super) fn find_range(&self) -> Option<(f64, f64)> {
+        (self.numbers.count > 0).then_some((self.numbers.least, self.numbers.greatest))
+    }
+
+    /// Is each number the one before plus one?
+    pub(super) fn counts_rows(&self) -> bool {
+        self.numbers.count > 1 && self.numbers.is_counting
     }
 
     /// Counts a cell; its number, where it is a plain one under a decimal point.
@@ -93,7 +132,7 @@ impl ColumnSurvey {
             Cell::Empty => self.absent += 1,
             Cell::Number(number) if number.is_finite() => {
                 self.typed += 1;
-                self.record_number(number);
+                self.numbers.record_number(number);
                 // Fourteen digits are exact in a double.
                 if (1e13..1e14).contains(&number) || (1e7..1e8).contains(&number) {
                     self.see_digits(&number.to_string());
@@ -127,7 +166,7 @@ impl ColumnSurvey {
                     self.point_example.get_or_insert_with(|| Example { line, text: text.to_owned() });
                 }
             }
-            self.record_number(number.value);
+            self.numbers.record_number(number.value);
             return Some(number.value);
         }
         if self.last_word == text && !text.is_empty() {
@@ -162,7 +201,7 @@ impl ColumnSurvey {
             self.see_suffix(number.suffix);
             self.see_digits(text);
             if let Some(number) = number.parse_value(Decimal::Point) {
-                self.record_number(number);
+                self.numbers.record_number(number);
             }
         } else if let Some(moment) = written_moment(text) {
             match (moment.date, moment.time_of_day_ns) {
@@ -227,17 +266,6 @@ impl ColumnSurvey {
             }
             _ => {}
         }
-    }
-
-    #[expect(clippy::float_cmp, reason = "a row number is a whole number, exactly")]
-    fn record_number(&mut self, number: f64) {
-        self.range = Some(self.range.map_or((number, number), |(low, high)| (low.min(number), high.max(number))));
-        self.first.get_or_insert(number);
-        if let Some(last) = self.last {
-            self.counts_rows = (self.steps == 0 || self.counts_rows) && number == last + 1.0;
-            self.steps += 1;
-        }
-        self.last = Some(number);
     }
 }
 

@@ -7,6 +7,7 @@ mod matlab;
 mod mtconnect;
 mod opendocument;
 mod parquet;
+mod percent_cells;
 mod shdr;
 mod sparse_sheet;
 mod tdms;
