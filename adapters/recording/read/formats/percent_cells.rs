@@ -97,8 +97,11 @@ fn find_part_of_sheet(archive: &mut Archive<'_>, sheet: &str) -> Option<String> 
 
 type Archive<'b> = ZipArchive<Cursor<&'b [u8]>>;
 
+/// Takes the name of an element, and what gives its attributes.
+type SeeElement<'s> = dyn FnMut(&str, &dyn Fn(&str) -> Option<String>) + 's;
+
 /// Goes through the elements of a part; what is broken is a matter of who reads the cells.
-fn visit_elements(archive: &mut Archive<'_>, part: &str, see: &mut dyn FnMut(&str, &dyn Fn(&str) -> Option<String>)) {
+fn visit_elements(archive: &mut Archive<'_>, part: &str, see: &mut SeeElement<'_>) {
     let Ok(content) = archive.by_name(part) else { return };
     let mut reader = Reader::from_reader(BufReader::new(content.take(UNPACKED_BYTES_MAX)));
     let mut buffer = Vec::new();
