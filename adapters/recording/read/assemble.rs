@@ -59,7 +59,7 @@ pub(super) struct Assembler<'p> {
     head: &'p Head,
     file: &'p str,
     blocks: Vec<BlockBuilder<'p>>,
-    repeated: u64,
+    repeats: u64,
     remarks: u64,
     done: Assembled,
 }
@@ -67,7 +67,7 @@ pub(super) struct Assembler<'p> {
 impl<'p> Assembler<'p> {
     pub(super) fn new(blocks: &'p [BlockPlan], head: &'p Head, file: &'p str) -> Self {
         let blocks = blocks.iter().map(BlockBuilder::new).collect();
-        Self { head, file, blocks, repeated: 0, remarks: 0, done: Assembled::default() }
+        Self { head, file, blocks, repeats: 0, remarks: 0, done: Assembled::default() }
     }
 
     /// Takes a row of this class. `plain`: the numbers of its cells as far as they are known already, see [`SeenText`].
@@ -82,7 +82,7 @@ impl<'p> Assembler<'p> {
         }
         match class {
             RowClass::Head => {}
-            RowClass::RepeatedHeader => self.repeated += 1,
+            RowClass::RepeatedHeader => self.repeats += 1,
             RowClass::Remark => self.remarks += 1,
             RowClass::Data(cells) => {
                 let seen = SeenRow { line: row.line, cells, plain };
@@ -107,7 +107,7 @@ impl<'p> Assembler<'p> {
 
     pub(super) fn finish_recordings(mut self, mapping: &Mapping) -> Assembled {
         count_note(
-            self.repeated,
+            self.repeats,
             ("times the header stands again among the data; left out", "次列名行在数据中重复，未读取"),
             &mut self.done.notes,
         );

@@ -132,8 +132,8 @@ pub fn read_csv(mut input: impl Read, file: &str) -> Result<ReadRecording, Recor
 
 fn read_input(input: Input, mapping: &Mapping) -> Result<ReadRecording, RecordingError> {
     let file = input.file.clone();
-    let UnderstoodTable { table, head, plan, assembled } = understand_input(input, mapping)?;
-    read_planned(table.as_ref(), &head, &plan?, assembled, mapping, &file)
+    let UnderstoodTable { table, head, plan, recordings } = understand_input(input, mapping)?;
+    read_planned(table.as_ref(), &head, &plan?, recordings, mapping, &file)
 }
 
 /// A table and how it is to be read.
@@ -142,14 +142,14 @@ struct UnderstoodTable {
     head: Head,
     plan: Result<ReadPlan, RecordingError>,
     /// Its rows under this plan, where they have been taken already.
-    assembled: Option<Assembled>,
+    recordings: Option<Assembled>,
 }
 
 impl UnderstoodTable {
     fn new(table: Box<dyn Table>, head: Head, counted: CountedTable, mapping: &Mapping, file: &str) -> Self {
         let plan = understand::build_plan(&head, &counted.survey, mapping, file);
-        let assembled = plan.as_ref().ok().and_then(|plan| counted.take_rows(&plan.blocks));
-        Self { table, head, plan, assembled }
+        let recordings = plan.as_ref().ok().and_then(|plan| counted.take_rows(&plan.blocks));
+        Self { table, head, plan, recordings }
     }
 }
 

@@ -18,19 +18,19 @@ const GUESS_ROWS: usize = 400;
 /// A whole table, counted.
 pub(super) struct CountedTable {
     pub(super) survey: Survey,
-    taken: Option<TakenRows>,
+    rows: Option<TakenRows>,
 }
 
 /// The rows of a table under a guess.
 struct TakenRows {
     guess: Vec<BlockPlan>,
-    assembled: Assembled,
+    recordings: Assembled,
 }
 
 impl CountedTable {
     /// The rows, where the plan is the one that was guessed.
     pub(super) fn take_rows(self, blocks: &[BlockPlan]) -> Option<Assembled> {
-        self.taken.filter(|taken| taken.guess == blocks).map(|taken| taken.assembled)
+        self.rows.filter(|rows| rows.guess == blocks).map(|rows| rows.recordings)
     }
 }
 
@@ -44,7 +44,7 @@ pub(super) fn count_cells(
     let guess = guess_blocks(table, head, mapping, file);
     match guess.and_then(|guess| read_under_guess(table, head, guess, mapping, file)) {
         Some(counted) => Ok(counted),
-        None => Ok(CountedTable { survey: survey_table(table, head)?, taken: None }),
+        None => Ok(CountedTable { survey: survey_table(table, head)?, rows: None }),
     }
 }
 
@@ -69,8 +69,8 @@ fn read_under_guess(
         Ok(VisitStep::Next)
     });
     visited.ok()?;
-    let assembled = assembler.finish_recordings(mapping);
-    Some(CountedTable { survey, taken: Some(TakenRows { guess, assembled }) })
+    let recordings = assembler.finish_recordings(mapping);
+    Some(CountedTable { survey, rows: Some(TakenRows { guess, recordings }) })
 }
 
 /// What the first rows say of the columns.

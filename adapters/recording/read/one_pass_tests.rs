@@ -42,7 +42,7 @@ fn find_difference_of_ways(input: &Input, mapping: &Mapping) -> Option<String> {
 /// Were the rows taken in the pass that counted them?
 fn is_guessed_right(text: &str) -> bool {
     let input = Input::from_memory(text.as_bytes().to_vec(), "t.csv");
-    understand_input(input, &Mapping::default()).expect("readable").assembled.is_some()
+    understand_input(input, &Mapping::default()).expect("readable").recordings.is_some()
 }
 
 /// Every file of the tests of recordings and every one of this crate.

@@ -56,10 +56,10 @@ pub struct Preview {
 pub fn preview_recording(path: &Path, mapping: &Mapping) -> Result<Preview, RecordingError> {
     let input = Input::from_path(path);
     let file = input.file.clone();
-    let UnderstoodTable { table, head, plan, assembled } = understand_input(input, mapping)?;
+    let UnderstoodTable { table, head, plan, recordings } = understand_input(input, mapping)?;
     let (blocks, read) = match plan {
         Ok(plan) => {
-            let read = read_planned(table.as_ref(), &head, &plan, assembled, mapping, &file);
+            let read = read_planned(table.as_ref(), &head, &plan, recordings, mapping, &file);
             (plan.blocks, read)
         }
         Err(error) => (Vec::new(), Err(error)),
