@@ -37,4 +37,4 @@ pub use driver::{
 pub use offset::{Axis, OffsetSink};
 pub use opened_device::{OpenedDevice, UnreadableSecret};
 pub use reading::{Absence, Reading, Stamp, Value};
-pub use sample::{Sample, Slot};
+pub use sample::{Sample, Slot, is_same_text};

@@ -3,6 +3,7 @@
 use crate::channel::ChannelId;
 use crate::clock::TimeNs;
 use crate::reading::{Absence, Value};
+use std::sync::Arc;
 
 /// What is known of one channel at a tick.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,8 +71,27 @@ impl Sample {
         self.slot(channel).value.as_ref().ok().and_then(Value::as_text)
     }
 
+    /// The text of `channel`, if it has one, to be kept without copying its letters.
+    #[must_use]
+    pub fn shared_text(&self, channel: ChannelId) -> Option<&Arc<str>> {
+        match &self.slot(channel).value {
+            Ok(Value::Text(text)) => Some(text),
+            _ => None,
+        }
+    }
+
     /// Every channel that a source provides, with its slot.
     pub fn provided_slots(&self) -> impl Iterator<Item = (ChannelId, &Slot)> {
         ChannelId::list_all().zip(&self.slots).filter(|(_, slot)| slot.value != Err(Absence::NotProvided))
+    }
+}
+
+/// Are both the same text, or both none? A text that goes on from tick to tick is the same memory: then no letter is compared.
+#[must_use]
+pub fn is_same_text(one: Option<&Arc<str>>, other: Option<&Arc<str>>) -> bool {
+    match (one, other) {
+        (None, None) => true,
+        (Some(one), Some(other)) => Arc::ptr_eq(one, other) || one == other,
+        _ => false,
     }
 }

@@ -1,10 +1,12 @@
 //! What a finished part was made with: time in each machine state, greatest power, and, for each tool, how long it cut, with
 //! what mean cutting power, against what limit of the wear model.
 
+use adapter_core::{ChannelId, Sample, is_same_text};
 use rules::estimators::wear::tool_of;
 use rules::estimators::{Estimates, State};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Tools of one part that are told apart; further ones are not listed.
 const TOOLS_MAX: usize = 64;
@@ -41,7 +43,7 @@ pub struct OperationUse {
 /// An operation in progress.
 #[derive(Debug, Clone, Default)]
 struct OpenOperation {
-    name: String,
+    name: SharedName,
     seconds: f64,
     cutting_s: f64,
     power: Mean,
@@ -67,6 +69,14 @@ pub struct ToolUse {
     pub wear_uncertainty_mm: Option<f64>,
 }
 
+/// The name of a tool or an operation as the sample has it; none is none, never an empty text.
+pub(super) type SharedName = Option<Arc<str>>;
+
+/// The text of this channel as a name.
+pub(super) fn name_of(sample: &Sample, channel: ChannelId) -> Option<&Arc<str>> {
+    sample.shared_text(channel).filter(|text| !text.is_empty())
+}
+
 /// A mean over time.
 #[derive(Debug, Clone, Copy, Default)]
 struct Mean {
@@ -89,7 +99,7 @@ impl Mean {
 
 #[derive(Debug, Clone, Default)]
 struct Tool {
-    name: String,
+    name: SharedName,
     cutting_s: f64,
     power: Mean,
     limit: Mean,
@@ -111,7 +121,7 @@ impl Gathering {
     pub(super) fn add_step(
         &mut self,
         estimates: &Estimates,
-        (tool, operation): (&str, &str),
+        (tool, operation): (Option<&Arc<str>>, Option<&Arc<str>>),
         power_w: Option<f64>,
         step_s: f64,
     ) {
@@ -127,10 +137,17 @@ impl Gathering {
         }
     }
 
-    fn add_operation_time(&mut self, estimates: &Estimates, name: &str, power_w: Option<f64>, step_s: f64) {
-        let index = self.operations.iter().position(|operation| operation.name == name).or_else(|| {
+    fn add_operation_time(
+        &mut self,
+        estimates: &Estimates,
+        name: Option<&Arc<str>>,
+        power_w: Option<f64>,
+        step_s: f64,
+    ) {
+        let is_named = |operation: &OpenOperation| is_same_text(operation.name.as_ref(), name);
+        let index = self.operations.iter().position(is_named).or_else(|| {
             (self.operations.len() < TOOLS_MAX).then(|| {
-                self.operations.push(OpenOperation { name: name.to_owned(), ..OpenOperation::default() });
+                self.operations.push(OpenOperation { name: name.cloned(), ..OpenOperation::default() });
                 self.operations.len() - 1
             })
         });
@@ -143,18 +160,21 @@ impl Gathering {
     }
 
     /// Adds the energy of a short silence of the meter to the operation in which it ended.
-    pub(super) fn bridge_energy_gap(&mut self, name: &str, (energy_j, seconds): (f64, f64)) {
-        let operation = self.operations.iter_mut().find(|operation| operation.name == name);
-        if let Some(operation) = operation.filter(|_| energy_j > 0.0) {
+    pub(super) fn bridge_energy_gap(&mut self, name: Option<&Arc<str>>, (energy_j, seconds): (f64, f64)) {
+        if energy_j <= 0.0 {
+            return;
+        }
+        let is_named = |operation: &&mut OpenOperation| is_same_text(operation.name.as_ref(), name);
+        if let Some(operation) = self.operations.iter_mut().find(is_named) {
             operation.power.sum += energy_j;
             operation.power.seconds += seconds;
         }
     }
 
-    fn add_cutting_time(&mut self, estimates: &Estimates, name: &str, step_s: f64) {
-        let index = self.tools.iter().position(|tool| tool.name == name).or_else(|| {
+    fn add_cutting_time(&mut self, estimates: &Estimates, name: Option<&Arc<str>>, step_s: f64) {
+        let index = self.tools.iter().position(|tool| is_same_text(tool.name.as_ref(), name)).or_else(|| {
             (self.tools.len() < TOOLS_MAX).then(|| {
-                self.tools.push(Tool { name: name.to_owned(), ..Tool::default() });
+                self.tools.push(Tool { name: name.cloned(), ..Tool::default() });
                 self.tools.len() - 1
             })
         });
@@ -176,7 +196,7 @@ impl Gathering {
             peak_power_w: done.peak_power_w,
             tools: done.tools.into_iter().map(ToolUse::from_tool).collect(),
             operations: match &done.operations[..] {
-                [only] if only.name.is_empty() => Vec::new(),
+                [only] if only.name.is_none() => Vec::new(),
                 _ => done.operations.into_iter().map(OperationUse::from_operation).collect(),
             },
         }
@@ -185,9 +205,10 @@ impl Gathering {
 
 impl ToolUse {
     fn from_tool(tool: Tool) -> Self {
+        let edge = tool.name.as_deref().unwrap_or_default();
         Self {
-            tool: tool_of(&tool.name).to_owned(),
-            edge: if tool_of(&tool.name) == tool.name { String::new() } else { tool.name },
+            tool: tool_of(edge).to_owned(),
+            edge: if tool_of(edge) == edge { String::new() } else { edge.to_owned() },
             cutting_s: round_value(tool.cutting_s, 1.0),
             cutting_power_w: tool.power.value().map(|watts| round_value(watts, 1.0)),
             limit_w: tool.limit.value().map(|watts| round_value(watts, 1.0)),
@@ -201,7 +222,7 @@ impl OperationUse {
     fn from_operation(operation: OpenOperation) -> Self {
         let known = operation.power.seconds > 0.0;
         Self {
-            operation: operation.name,
+            operation: operation.name.as_deref().unwrap_or_default().to_owned(),
             seconds: round_value(operation.seconds, 1.0),
             cutting_s: round_value(operation.cutting_s, 1.0),
             energy_j: known.then(|| round_value(operation.power.sum, 0.0)),
@@ -226,18 +247,22 @@ mod tests {
         Estimates { state: State::Cutting, cutting_power_w: Ok(estimate), ..Estimates::without_samples(0) }
     }
 
+    fn share_name(text: &str) -> SharedName {
+        Some(Arc::from(text))
+    }
+
     #[test]
     fn means_are_over_the_time_and_the_next_part_begins_anew() {
         let mut gathering = Gathering::default();
         gathering.add_step(
             &Estimates { state: State::Idle, ..Estimates::without_samples(0) },
-            ("T1", ""),
+            (share_name("T1").as_ref(), None),
             Some(300.0),
             4.0,
         );
-        gathering.add_step(&cutting(1000.0), ("T1", ""), Some(1300.0), 1.0);
-        gathering.add_step(&cutting(400.0), ("T2", ""), Some(700.0), 1.0);
-        gathering.add_step(&cutting(1300.0), ("T1", ""), None, 2.0);
+        gathering.add_step(&cutting(1000.0), (share_name("T1").as_ref(), None), Some(1300.0), 1.0);
+        gathering.add_step(&cutting(400.0), (share_name("T2").as_ref(), None), Some(700.0), 1.0);
+        gathering.add_step(&cutting(1300.0), (share_name("T1").as_ref(), None), None, 2.0);
         let detail = gathering.finish_part();
         assert_eq!(detail.seconds, BTreeMap::from([("cutting".to_owned(), 4.0), ("idle".to_owned(), 4.0)]));
         assert_eq!(detail.peak_power_w, Some(1300.0));
@@ -251,7 +276,9 @@ mod tests {
     #[test]
     fn a_part_with_endless_tools_stays_small() {
         let mut gathering = Gathering::default();
-        (0..1000).for_each(|at| gathering.add_step(&cutting(1.0), (&format!("T{at}"), ""), None, 1.0));
+        (0..1000).for_each(|at| {
+            gathering.add_step(&cutting(1.0), (share_name(&format!("T{at}")).as_ref(), None), None, 1.0)
+        });
         assert_eq!(gathering.finish_part().tools.len(), TOOLS_MAX);
     }
 }

@@ -1,9 +1,9 @@
 //! Finished parts, from what the controller says: its part counter, or the name of the part where it has no counter.
 
 use super::channels::Channels;
-use super::part_detail::Gathering;
-use adapter_core::Sample;
+use super::part_detail::{Gathering, name_of};
 use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::{Sample, is_same_text};
 use gateway_history::Part;
 use rules::estimators::{Estimates, NoEstimate, PartFigures, State};
 use std::sync::Arc;
@@ -89,16 +89,15 @@ impl CycleFollower {
         let step_s = step_ns as f64 / SECOND_NS as f64;
         if estimates.state == State::Cutting {
             self.cutting_s += step_s;
-            let now = sample.text(channels.program).filter(|name| !name.is_empty());
-            if now.is_some() && now != self.program.as_deref() {
-                self.program = now.map(Arc::from);
+            let now = name_of(sample, channels.program);
+            if now.is_some() && !is_same_text(now, self.program.as_ref()) {
+                self.program = now.cloned();
             }
         }
         self.cutting_energy_j += estimates.cutting_power_w.map_or(0.0, |power| power.value * step_s);
         self.idle_s += if estimates.state == State::Idle { step_s } else { 0.0 };
         let power = sample.number(channels.total_power).or_else(|_| sample.number(channels.spindle_power));
-        let tool = sample.text(channels.tool).unwrap_or_default();
-        let operation = sample.text(channels.operation).unwrap_or_default();
+        let (tool, operation) = (name_of(sample, channels.tool), name_of(sample, channels.operation));
         self.gathering.add_step(estimates, (tool, operation), power.ok(), step_s);
         match power {
             Ok(power_w) => {

@@ -1,22 +1,18 @@
 //! The second way through a table: rows become a block under the plan, and whatever is not used is counted by column and line.
 
-use super::cell::{Cell, Decimal, is_absent, parse_flag, written_number};
-use super::cell_unit::CellUnits;
-use super::convert::{
-    is_nothing, join_date_and_time, moment_of_cell, number_of, show_cell, text_of, to_nanoseconds, unix_ns,
-    utc_or_local,
-};
+use super::cell::{Cell, Decimal};
+use super::column_builder::{ColumnBuilder, SeenText, parse_text_number};
+use super::convert::{join_date_and_time, moment_of_cell, number_of, show_cell, to_nanoseconds, unix_ns, utc_or_local};
 use super::error::{RecordingError, RowProblem};
 use super::head::Head;
 use super::limits::{CELLS_MAX, DESCRIBED_MAX, WORDS_BYTES_MAX};
 use super::mapping::Mapping;
-use super::plain_number::scan_plain_number;
-use super::plan::{BlockPlan, Note, NoteKind, PlannedColumn, PlannedKind, ReadPlan, TimeKind};
+use super::plan::{BlockPlan, Note, NoteKind, TimeKind};
 use super::restart::name_runs;
-use super::survey::{fit_row, is_comment, repeats_header};
-use super::table::{Table, VisitStep};
+use super::row_class::{RowClass, classify_row};
+use super::table::{Row, Table, VisitStep};
 use super::time::{RawTime, resolve_times};
-use crate::{Cells, Numbers, Recording, Words};
+use crate::{Cells, Recording};
 use adapter_core::clock::SECOND_NS;
 
 /// Lines after the data that are taken for sums and remarks; more of them are refused rows.
@@ -45,75 +41,107 @@ impl Assembled {
 pub(super) fn assemble_recordings(
     table: &dyn Table,
     head: &Head,
-    plan: &ReadPlan,
+    blocks: &[BlockPlan],
     mapping: &Mapping,
     file: &str,
 ) -> Result<Assembled, RecordingError> {
-    let mut done = Assembled::default();
-    let mut blocks: Vec<BlockBuilder<'_>> = plan.blocks.iter().map(BlockBuilder::new).collect();
+    let mut assembler = Assembler::new(blocks, head, file);
     let short = table.may_be_short() || head.short;
-    let (mut repeated, mut comments) = (0_u64, 0_u64);
     table.visit_rows(&mut |row| {
-        if row.line < head.data_line || row.cells.iter().all(|cell| *cell == Cell::Empty) {
-            return Ok(VisitStep::Next);
-        }
-        if repeats_header(row, head) {
-            repeated += 1;
-            return Ok(VisitStep::Next);
-        }
-        if is_comment(row, head) {
-            comments += 1;
-            return Ok(VisitStep::Next);
-        }
-        match fit_row(row, head, short) {
-            Some(cells) => blocks.iter_mut().for_each(|block| block.accept_row(row.line, cells, &mut done)),
-            None => {
-                let one_more = row.cells.len() == head.names.len() + 1;
-                let hint = if one_more { "; a number with a decimal comma has to stand in quotes here" } else { "" };
-                let reason = format!("{} cells where the header has {}{hint}", row.cells.len(), head.names.len());
-                done.record_refusal(RowProblem { line: row.line, column: None, reason });
-                blocks.iter_mut().for_each(|block| block.rows += 1);
-            }
-        }
-        blocks.iter().try_for_each(|block| block.within_limits(file))?;
+        assembler.take_row(row, classify_row(row, head, short), &[])?;
         Ok(VisitStep::Next)
     })?;
-    count_note(
-        repeated,
-        ("times the header stands again among the data; left out", "次列名行在数据中重复，未读取"),
-        &mut done.notes,
-    );
-    count_note(comments, ("lines of remarks among the data left out", "行注释未读取"), &mut done.notes);
-    for block in blocks {
-        let recording = block.finish_recording(file, mapping, &mut done);
-        done.blocks.push(recording);
+    Ok(assembler.finish_recordings(mapping))
+}
+
+/// Takes row after row.
+pub(super) struct Assembler<'p> {
+    head: &'p Head,
+    file: &'p str,
+    blocks: Vec<BlockBuilder<'p>>,
+    repeats: u64,
+    remarks: u64,
+    done: Assembled,
+}
+
+impl<'p> Assembler<'p> {
+    pub(super) fn new(blocks: &'p [BlockPlan], head: &'p Head, file: &'p str) -> Self {
+        let blocks = blocks.iter().map(BlockBuilder::new).collect();
+        Self { head, file, blocks, repeats: 0, remarks: 0, done: Assembled::default() }
     }
-    done.problems.sort_by_key(|problem| problem.line);
-    Ok(done)
+
+    /// Takes a row of this class. `plain`: the numbers of its cells as far as they are known already, see [`SeenText`].
+    pub(super) fn take_row(
+        &mut self,
+        row: &Row<'_>,
+        class: RowClass<'_>,
+        plain: &[Option<f64>],
+    ) -> Result<(), RecordingError> {
+        if class == RowClass::Head || row.cells.iter().all(|cell| *cell == Cell::Empty) {
+            return Ok(());
+        }
+        match class {
+            RowClass::Head => {}
+            RowClass::RepeatedHeader => self.repeats += 1,
+            RowClass::Remark => self.remarks += 1,
+            RowClass::Data(cells) => {
+                let seen = SeenRow { line: row.line, cells, plain };
+                for block in &mut self.blocks {
+                    block.accept_row(&seen, &mut self.done);
+                    block.within_limits(self.file)?;
+                }
+            }
+            RowClass::OtherWidth => self.refuse_width(row),
+        }
+        Ok(())
+    }
+
+    fn refuse_width(&mut self, row: &Row<'_>) {
+        let width = self.head.names.len();
+        let one_more = row.cells.len() == width + 1;
+        let hint = if one_more { "; a number with a decimal comma has to stand in quotes here" } else { "" };
+        let reason = format!("{} cells where the header has {width}{hint}", row.cells.len());
+        self.done.record_refusal(RowProblem { line: row.line, column: None, reason });
+        self.blocks.iter_mut().for_each(|block| block.rows += 1);
+    }
+
+    pub(super) fn finish_recordings(mut self, mapping: &Mapping) -> Assembled {
+        count_note(
+            self.repeats,
+            ("times the header stands again among the data; left out", "次列名行在数据中重复，未读取"),
+            &mut self.done.notes,
+        );
+        count_note(self.remarks, ("lines of remarks among the data left out", "行注释未读取"), &mut self.done.notes);
+        for block in self.blocks {
+            let recording = block.finish_recording(self.file, mapping, &mut self.done);
+            self.done.blocks.push(recording);
+        }
+        self.done.problems.sort_by_key(|problem| problem.line);
+        self.done
+    }
+}
+
+/// A row of data, and the numbers of its cells as far as they are known already.
+struct SeenRow<'a> {
+    line: u64,
+    cells: &'a [Cell<'a>],
+    plain: &'a [Option<f64>],
+}
+
+impl<'a> SeenRow<'a> {
+    fn cell_at(&self, index: usize) -> Cell<'a> {
+        self.cells.get(index).copied().unwrap_or(Cell::Empty)
+    }
+
+    fn plain_at(&self, index: usize) -> Option<f64> {
+        self.plain.get(index).copied().flatten()
+    }
 }
 
 fn count_note(count: u64, (en, zh): (&str, &str), notes: &mut Vec<Note>) {
     if count > 0 {
         notes.push(Note::new(NoteKind::Loss, format!("{count} {en}"), format!("{count}{zh}")));
     }
-}
-
-/// Cells of one column that were not used.
-#[derive(Debug, Default)]
-struct Loss {
-    count: u64,
-    lines: Vec<u64>,
-    example: String,
-}
-
-struct ColumnBuilder<'p> {
-    plan: &'p PlannedColumn,
-    numbers: Numbers,
-    words: Words,
-    words_bytes: usize,
-    loss: Loss,
-    /// The number of the row that is looked at.
-    row_number: Option<f64>,
 }
 
 struct BlockBuilder<'p> {
@@ -125,41 +153,37 @@ struct BlockBuilder<'p> {
     columns: Vec<ColumnBuilder<'p>>,
     /// Rows without a time since the last one that had one: the end of the file says whether they are a footer.
     problems: Vec<RowProblem>,
+    has_new_word: bool,
 }
 
 impl<'p> BlockBuilder<'p> {
     fn new(plan: &'p BlockPlan) -> Self {
-        let column = |plan| ColumnBuilder {
-            plan,
-            numbers: Numbers::default(),
-            words: Words::default(),
-            words_bytes: 0,
-            loss: Loss::default(),
-            row_number: None,
-        };
         Self {
             plan,
             rows: 0,
             lines: Vec::new(),
             times: Vec::new(),
-            columns: plan.columns.iter().map(column).collect(),
+            columns: plan.columns.iter().map(ColumnBuilder::new).collect(),
             problems: Vec::new(),
+            has_new_word: false,
         }
     }
 
     /// Takes the row as a whole or not at all.
-    fn accept_row(&mut self, line: u64, cells: &[Cell<'_>], done: &mut Assembled) {
-        let at = |index: usize| cells.get(index).copied().unwrap_or(Cell::Empty);
-        let has_time = self.plan.time.index.is_some_and(|index| at(index) != Cell::Empty);
+    fn accept_row(&mut self, row: &SeenRow<'_>, done: &mut Assembled) {
+        let line = row.line;
+        let has_time = self.plan.time.index.is_some_and(|index| row.cell_at(index) != Cell::Empty);
         self.rows += 1;
         // Of several clocks the shorter ones end earlier.
-        if !has_time && self.plan.columns.iter().all(|column| at(column.index) == Cell::Empty) {
+        if !has_time && self.plan.columns.iter().all(|column| row.cell_at(column.index) == Cell::Empty) {
             return;
         }
-        let column = Some(self.plan.time.source.clone());
-        let time = match self.parse_time(cells) {
+        let time = match self.parse_time(row) {
             Ok(time) => time,
-            Err(reason) => return self.problems.push(RowProblem { line, column, reason }),
+            Err(reason) => {
+                let column = Some(self.plan.time.source.clone());
+                return self.problems.push(RowProblem { line, column, reason });
+            }
         };
         let Ok(stored_line) = u32::try_from(line) else {
             let reason = format!("only the first {} lines of a file are read", u32::MAX);
@@ -167,16 +191,19 @@ impl<'p> BlockBuilder<'p> {
         };
         std::mem::take(&mut self.problems).into_iter().for_each(|problem| done.record_refusal(problem));
         for builder in &mut self.columns {
-            if let Err(reason) = builder.look_at(at(builder.plan.index)) {
+            let index = builder.plan.index;
+            if let Err(reason) = builder.look_at(row.cell_at(index), row.plain_at(index)) {
                 return done.record_refusal(RowProblem { line, column: Some(builder.plan.source.clone()), reason });
             }
         }
-        self.columns.iter_mut().for_each(|builder| builder.push(line, at(builder.plan.index)));
+        for builder in &mut self.columns {
+            self.has_new_word |= builder.push(line, row.cell_at(builder.plan.index));
+        }
         self.lines.push(stored_line);
         self.times.push(time);
     }
 
-    fn within_limits(&self, file: &str) -> Result<(), RecordingError> {
+    fn within_limits(&mut self, file: &str) -> Result<(), RecordingError> {
         let cells = self.times.len() * (self.columns.len() + 1);
         if cells > CELLS_MAX {
             let rows = self.times.len();
@@ -187,6 +214,9 @@ impl<'p> BlockBuilder<'p> {
                 ),
                 format!("超过{CELLS_MAX}个单元格（已读{rows}行）：请在映射文件中去掉一些列，或分成几个文件"),
             ));
+        }
+        if !std::mem::take(&mut self.has_new_word) {
+            return Ok(());
         }
         match self.columns.iter().find(|column| column.words_bytes > WORDS_BYTES_MAX) {
             Some(column) => Err(RecordingError::with_format_reason(
@@ -202,21 +232,22 @@ impl<'p> BlockBuilder<'p> {
         }
     }
 
-    fn parse_time(&self, cells: &[Cell<'_>]) -> Result<RawTime, String> {
+    fn parse_time(&self, row: &SeenRow<'_>) -> Result<RawTime, String> {
         let plan = &self.plan.time;
-        let at = |index: usize| cells.get(index).copied().unwrap_or(Cell::Empty);
-        let cell = plan.index.map_or(Cell::Empty, at);
-        let part_ns = plan.milliseconds.and_then(|index| number_of(at(index))).map_or(0, |ms| to_nanoseconds(ms / 1e3));
+        let cell = plan.index.map_or(Cell::Empty, |index| row.cell_at(index));
+        let plain = plan.index.and_then(|index| row.plain_at(index));
+        let part = plan.milliseconds.and_then(|index| number_of(row.cell_at(index)));
+        let part_ns = part.map_or(0, |ms| to_nanoseconds(ms / 1e3));
         let time = match plan.kind {
             TimeKind::Step { step_s, start } => Some(step_time(self.rows - 1, step_s, start)),
             TimeKind::Seconds { decimal, factor, offset_s } => {
-                self.parse_number(cell, decimal).map(|number| RawTime::Seconds(number * factor + offset_s))
+                self.parse_number(cell, plain, decimal).map(|number| RawTime::Seconds(number * factor + offset_s))
             }
             TimeKind::Unix { decimal, factor, epoch_s } => unix_ns(cell, factor)
-                .or_else(|| self.parse_number(cell, decimal).map(|number| to_nanoseconds(number * factor)))
+                .or_else(|| self.parse_number(cell, plain, decimal).map(|number| to_nanoseconds(number * factor)))
                 .map(|at_ns| RawTime::Utc(at_ns.saturating_sub(epoch_s.saturating_mul(SECOND_NS)))),
             TimeKind::Days { decimal, factor } => self
-                .parse_number(cell, decimal)
+                .parse_number(cell, plain, decimal)
                 .map(|days| RawTime::Local(to_nanoseconds((days * factor - 25_569.0) * 86_400.0))),
             TimeKind::TimesOfDay => {
                 moment_of_cell(cell).and_then(|moment| moment.time_of_day_ns).map(|ns| RawTime::OfDay(ns + part_ns))
@@ -228,7 +259,7 @@ impl<'p> BlockBuilder<'p> {
                     .filter(|moment| moment.date.is_some())
                     .and_then(|moment| utc_or_local(moment, order)),
                 (_, Some(date)) => {
-                    join_date_and_time(at(date), cell, order).map(|at_ns| RawTime::Local(at_ns + part_ns))
+                    join_date_and_time(row.cell_at(date), cell, order).map(|at_ns| RawTime::Local(at_ns + part_ns))
                 }
             },
         };
@@ -240,10 +271,11 @@ impl<'p> BlockBuilder<'p> {
         })
     }
 
-    fn parse_number(&self, cell: Cell<'_>, decimal: Decimal) -> Option<f64> {
+    fn parse_number(&self, cell: Cell<'_>, plain: Option<f64>, decimal: Decimal) -> Option<f64> {
+        let units = self.plan.time.cell_units.as_ref();
         match cell {
             Cell::Number(number) => Some(number),
-            Cell::Text(text) => parse_text_number(text, decimal, self.plan.time.cell_units.as_ref()),
+            Cell::Text(text) => parse_text_number(SeenText { text, plain }, decimal, units),
             _ => None,
         }
     }
@@ -293,16 +325,6 @@ impl<'p> BlockBuilder<'p> {
     }
 }
 
-/// A number as text under a decimal sign, in the unit of its column where its cells bring their own.
-fn parse_text_number(text: &str, decimal: Decimal, units: Option<&CellUnits>) -> Option<f64> {
-    if let Some(number) = scan_plain_number(text, decimal) {
-        return units.map_or(Some(number.value), |units| units.convert_number(number.value, ""));
-    }
-    let number = written_number(text)?;
-    let value = number.parse_value(decimal)?;
-    units.map_or(Some(value), |units| units.convert_number(value, number.suffix))
-}
-
 /// The time of a row that is counted.
 #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
 fn step_time(row: u64, step_s: f64, start: Option<RawTime>) -> RawTime {
@@ -311,89 +333,5 @@ fn step_time(row: u64, step_s: f64, start: Option<RawTime>) -> RawTime {
         Some(RawTime::Utc(at_ns)) => RawTime::Utc(at_ns.saturating_add(to_nanoseconds(since_s))),
         Some(RawTime::Local(at_ns)) => RawTime::Local(at_ns.saturating_add(to_nanoseconds(since_s))),
         _ => RawTime::Seconds(since_s),
-    }
-}
-
-impl ColumnBuilder<'_> {
-    /// Takes the number of a cell; a cell of a strict column that holds none and is not absent refuses its row.
-    fn look_at(&mut self, cell: Cell<'_>) -> Result<(), String> {
-        if self.plan.kind == PlannedKind::Words {
-            return Ok(());
-        }
-        self.row_number = self.parse_number(cell);
-        match (self.plan.kind, cell, self.row_number) {
-            (PlannedKind::Numbers { .. }, Cell::Text(text), None) if self.plan.strict && !is_absent(text) => {
-                Err(format!(
-                    "{text:?} is not a finite number with a decimal point; leave the cell empty where there is no value"
-                ))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    fn parse_number(&self, cell: Cell<'_>) -> Option<f64> {
-        match (self.plan.kind, cell) {
-            (PlannedKind::Flags, Cell::Text(text)) => parse_flag(text)
-                .map(|(_, yes)| f64::from(u8::from(yes)))
-                .or_else(|| text.parse().ok().filter(|x: &f64| x.is_finite())),
-            (PlannedKind::Flags, Cell::Number(number)) => Some(number),
-            (PlannedKind::Numbers { decimal, factor, offset }, Cell::Text(text)) => {
-                let value = parse_text_number(text, decimal, self.plan.cell_units.as_ref());
-                let value = value.or_else(|| parse_flag(text).map(|(_, yes)| f64::from(u8::from(yes))));
-                value.map(|value| value * factor + offset)
-            }
-            (PlannedKind::Numbers { factor, offset, .. }, Cell::Number(number)) => Some(number * factor + offset),
-            (_, Cell::Flag(flag)) => Some(f64::from(u8::from(flag))),
-            _ => None,
-        }
-    }
-
-    fn push(&mut self, line: u64, cell: Cell<'_>) {
-        if self.plan.kind == PlannedKind::Words {
-            let owned;
-            let text = match cell {
-                Cell::Text(text) if is_absent(text) => "",
-                Cell::Text(text) => text,
-                cell => {
-                    owned = text_of(cell);
-                    owned.as_str()
-                }
-            };
-            let before = self.words.words().len();
-            self.words.push(text);
-            if self.words.words().len() > before {
-                self.words_bytes += text.len() + 64;
-            }
-            return;
-        }
-        let number = self.row_number;
-        if number.is_none() && !is_nothing(cell) {
-            self.loss.count += 1;
-            if self.loss.lines.len() < 5 {
-                self.loss.lines.push(line);
-            }
-            if self.loss.example.is_empty() {
-                self.loss.example = show_cell(cell);
-            }
-        }
-        self.numbers.push(number);
-    }
-
-    fn loss_note(&self, notes: &mut Vec<Note>) {
-        let Loss { count, lines, example } = &self.loss;
-        if *count == 0 {
-            return;
-        }
-        let lines: Vec<String> = lines.iter().map(u64::to_string).collect();
-        let (name, lines) = (&self.plan.source, lines.join(", "));
-        notes.push(Note::new(
-            NoteKind::Loss,
-            format!("{name}: {count} cells are no numbers and count as absent, such as {example} (lines {lines})"),
-            format!("{name}：{count}个单元格不是数字，按缺失处理，例如{example}（第{lines}行）"),
-        ));
-    }
-
-    fn into_cells(self) -> Cells {
-        if self.plan.kind == PlannedKind::Words { Cells::Words(self.words) } else { Cells::Numbers(self.numbers) }
     }
 }

@@ -223,7 +223,7 @@ impl ForeignColumns<'_> {
         let is_part = |other: &usize| {
             *other != index
                 && self.names[*other].is_time_part()
-                && self.surveys[*other].range.is_some_and(|(low, high)| low >= 0.0 && high < 1000.0)
+                && self.surveys[*other].find_range().is_some_and(|(low, high)| low >= 0.0 && high < 1000.0)
         };
         let milliseconds = (0..self.names.len()).find(is_part).filter(|_| self.has_times_of_day(index));
         let kind = match date {

@@ -65,6 +65,9 @@ fn guess_encoding(input: &Input) -> Result<&'static Encoding, RecordingError> {
 }
 
 fn is_utf8(input: &Input) -> Result<bool, RecordingError> {
+    if let Some(bytes) = input.bytes_in_memory() {
+        return Ok(std::str::from_utf8(bytes).is_ok());
+    }
     let mut bytes = input.open()?;
     let mut check = UTF_8.new_decoder_without_bom_handling();
     let (mut chunk, mut text) = (vec![0; CHUNK], vec![0; 3 * CHUNK + 16]);

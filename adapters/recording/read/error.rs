@@ -81,20 +81,6 @@ impl RecordingError {
         Self::Format { file: file.to_owned(), reason: Bilingual::new(en, zh) }
     }
 
-    /// The same error once more.
-    pub(super) fn copy_error(&self) -> Self {
-        match self {
-            Self::Io { file, error } => {
-                Self::Io { file: file.clone(), error: std::io::Error::new(error.kind(), error.to_string()) }
-            }
-            Self::Header { file, line, reason } => {
-                Self::Header { file: file.clone(), line: *line, reason: reason.clone() }
-            }
-            Self::Format { file, reason } => Self::Format { file: file.clone(), reason: reason.clone() },
-            Self::Empty { file, problems } => Self::Empty { file: file.clone(), problems: problems.clone() },
-        }
-    }
-
     /// The same in Chinese, where it was written in Chinese.
     #[must_use]
     pub fn describe_in_chinese(&self) -> String {

@@ -7,7 +7,7 @@ use super::limits::HEAD_ROWS;
 use super::mapping::Mapping;
 use super::moment::written_moment;
 use super::names::ForeignName;
-use super::survey::is_annotation;
+use super::row_class::is_annotation;
 use super::table::{OwnedCell, Table, VisitStep};
 use adapter_core::bilingual::Bilingual;
 use adapter_core::channel::unit::Unit;

@@ -16,6 +16,8 @@ pub(super) struct Input {
 enum InputPlace {
     Path(PathBuf),
     Memory(Vec<u8>),
+    /// Everything, unpacked already.
+    Unpacked(Vec<u8>),
 }
 
 /// What a format reader that jumps about needs.
@@ -53,15 +55,34 @@ impl Input {
                 1 << 16,
                 open_regular_file(path).map_err(|error| self.build_io_error(error))?,
             )),
-            InputPlace::Memory(bytes) => Box::new(Cursor::new(bytes.as_slice())),
+            InputPlace::Memory(bytes) | InputPlace::Unpacked(bytes) => Box::new(Cursor::new(bytes.as_slice())),
         })
     }
 
     /// Unpacked where it is gzipped.
     pub(super) fn open(&self) -> Result<Box<dyn Read + '_>, RecordingError> {
+        if let InputPlace::Unpacked(bytes) = &self.place {
+            return Ok(Box::new(bytes.as_slice()));
+        }
         let mut buffered = BufReader::with_capacity(1 << 16, self.open_raw()?);
         let packed = buffered.fill_buf().map_err(|error| self.build_io_error(error))?.starts_with(&GZIP);
         Ok(if packed { Box::new(flate2::bufread::MultiGzDecoder::new(buffered)) } else { Box::new(buffered) })
+    }
+
+    /// Unpacks everything into memory, so that going through it again costs little; left as it is where it is more than so many bytes.
+    pub(super) fn keep_in_memory(&mut self, most: u64) -> Result<(), RecordingError> {
+        if let Some(bytes) = self.read_whole(most)? {
+            self.place = InputPlace::Unpacked(bytes);
+        }
+        Ok(())
+    }
+
+    /// Everything unpacked, where it was put into memory.
+    pub(super) fn bytes_in_memory(&self) -> Option<&[u8]> {
+        match &self.place {
+            InputPlace::Unpacked(bytes) => Some(bytes),
+            InputPlace::Path(_) | InputPlace::Memory(_) => None,
+        }
     }
 
     /// The first bytes after unpacking, at most so many.

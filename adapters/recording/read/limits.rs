@@ -8,6 +8,8 @@ pub(crate) const ROW_BYTES_MAX: usize = 4 << 20;
 pub(crate) const CELLS_MAX: usize = 120_000_000;
 /// Cells of formats that have to stand in memory as a whole before they are understood (workbooks, MTConnect): 24 bytes each.
 pub(crate) const CELLS_IN_MEMORY_MAX: usize = 20_000_000;
+/// Bytes of a text that is put into memory as a whole; a longer one is read from its file in pieces, each time it is gone through.
+pub(crate) const TEXT_IN_MEMORY_MAX: u64 = 64 << 20;
 /// Bytes of all the different words of one text column.
 pub(crate) const WORDS_BYTES_MAX: usize = 64 << 20;
 /// Bytes that a compressed workbook may come to.

@@ -6,7 +6,8 @@ use super::error::RecordingError;
 use super::head::Head;
 use super::limits::{CELLS_IN_MEMORY_MAX, COLUMNS_MAX};
 use super::names::{ForeignName, squeeze_name};
-use super::survey::{Survey, fit_row, is_comment, repeats_header};
+use super::row_class::{RowClass, classify_row};
+use super::survey::Survey;
 use super::table::{ColumnCells, ColumnTable, OwnedCell, Table, VisitStep};
 use adapter_core::bilingual::Bilingual;
 use std::collections::HashMap;
@@ -63,10 +64,7 @@ pub(super) fn turn_table(
     let mut known: HashMap<(String, String), usize> = HashMap::new();
     let mut cells = 0;
     table.visit_rows(&mut |row| {
-        if row.line < head.data_line || is_comment(row, head) || repeats_header(row, head) {
-            return Ok(VisitStep::Next);
-        }
-        let Some(found) = fit_row(row, head, true) else { return Ok(VisitStep::Next) };
+        let RowClass::Data(found) = classify_row(row, head, true) else { return Ok(VisitStep::Next) };
         let at = |index: usize| found.get(index).copied().unwrap_or(Cell::Empty);
         let Cell::Text(text) = at(name) else { return Ok(VisitStep::Next) };
         let part = table_number.map_or_else(String::new, |index| text_of(at(index)));

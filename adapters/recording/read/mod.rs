@@ -1,8 +1,9 @@
 //! Reading a recording from any file that people have.
 //!
-//! A file is gone through twice. The first time every cell is only counted (`survey`); then it is decided, with all of the file known, what each
-//! column is (`understand`, `clock`, `names`); the second time the rows are taken (`assemble`). So no single cell can change what a column is,
-//! and nothing is decided without a sentence in [`ReadRecording::notes`]. A file that is written as `recording/1` says is read as it stands
+//! Every cell of a file is counted (`survey`); then it is decided, with all of the file known, what each column is (`understand`, `clock`,
+//! `names`). The rows are taken (`assemble`) in the same pass, under a guess from the first of them (`one_pass`); where another plan is
+//! decided than was guessed, they are taken a second time. So no single cell can change what a column is, and nothing is decided without a
+//! sentence in [`ReadRecording::notes`]. A file that is written as `recording/1` says is read as it stands
 //! there. A [`Mapping`] overrides every assumption.
 //!
 //! | file | what |
@@ -13,7 +14,7 @@
 //! | `long` | one line for each value, turned into columns |
 //! | `cell`, `plain_number`, `cell_unit`, `moment`, `compact_moment` | what one cell may be |
 //! | `survey`, `understand`, `targets`, `clock`, `numeric_time`, `names` | what a column is |
-//! | `assemble`, `time`, `restart`, `merge` | rows, time, tests one after the other, several clocks in one file |
+//! | `row_class`, `one_pass`, `assemble`, `column_builder`, `time`, `restart`, `merge` | rows, time, tests one after the other, several clocks in one file |
 //! | `preview` | how a file is understood, for a person and for a map |
 //! | `limits` | how much is taken at most |
 
@@ -21,6 +22,7 @@ mod assemble;
 pub mod cell;
 mod cell_unit;
 mod clock;
+mod column_builder;
 mod compact_moment;
 mod convert;
 pub(super) mod encoding;
@@ -36,10 +38,12 @@ mod merge;
 mod moment;
 pub mod names;
 mod numeric_time;
+mod one_pass;
 mod plain_number;
 pub(super) mod plan;
 mod preview;
 mod restart;
+mod row_class;
 mod splitter;
 mod survey;
 pub(super) mod table;
@@ -54,8 +58,11 @@ pub use preview::{ColumnPreview, Preview, TimePreview, find_difference, preview_
 use super::Recording;
 
 use adapter_core::bilingual::Bilingual;
+use assemble::Assembled;
+use head::Head;
 use input::Input;
 use mapping::Mapping;
+use one_pass::{CountedTable, count_cells};
 use plan::{Note, NoteKind, ReadPlan};
 use std::io::Read;
 use std::path::Path;
@@ -125,15 +132,25 @@ pub fn read_csv(mut input: impl Read, file: &str) -> Result<ReadRecording, Recor
 
 fn read_input(input: Input, mapping: &Mapping) -> Result<ReadRecording, RecordingError> {
     let file = input.file.clone();
-    let understood = understand_input(input, mapping)?;
-    read_understood(&understood, mapping, &file)
+    let UnderstoodTable { table, head, plan, recordings } = understand_input(input, mapping)?;
+    read_planned(table.as_ref(), &head, &plan?, recordings, mapping, &file)
 }
 
 /// A table and how it is to be read.
 struct UnderstoodTable {
     table: Box<dyn Table>,
-    head: head::Head,
+    head: Head,
     plan: Result<ReadPlan, RecordingError>,
+    /// Its rows under this plan, where they have been taken already.
+    recordings: Option<Assembled>,
+}
+
+impl UnderstoodTable {
+    fn new(table: Box<dyn Table>, head: Head, counted: CountedTable, mapping: &Mapping, file: &str) -> Self {
+        let plan = understand::build_plan(&head, &counted.survey, mapping, file);
+        let recordings = plan.as_ref().ok().and_then(|plan| counted.take_rows(&plan.blocks));
+        Self { table, head, plan, recordings }
+    }
 }
 
 /// Head and plan of a file; a table that has a line for each value is turned first.
@@ -141,26 +158,28 @@ fn understand_input(input: Input, mapping: &Mapping) -> Result<UnderstoodTable, 
     let file = input.file.clone();
     let table = formats::open_table(input, mapping)?;
     let head = head::find_head(table.as_ref(), head::GivenHead::from_mapping(mapping), &file)?;
-    let survey = survey::survey_table(table.as_ref(), &head)?;
-    if let Some(turned) = long::turn_table(table.as_ref(), &head, &survey, &file)? {
+    let counted = count_cells(table.as_ref(), &head, mapping, &file)?;
+    if let Some(turned) = long::turn_table(table.as_ref(), &head, &counted.survey, &file)? {
         let head = head::find_head(&turned, head::GivenHead::default(), &file)?;
-        let survey = survey::survey_table(&turned, &head)?;
-        let plan = understand::build_plan(&head, &survey, mapping, &file);
-        return Ok(UnderstoodTable { table: Box::new(turned), head, plan });
+        let counted = count_cells(&turned, &head, mapping, &file)?;
+        return Ok(UnderstoodTable::new(Box::new(turned), head, counted, mapping, &file));
     }
-    let plan = understand::build_plan(&head, &survey, mapping, &file);
-    Ok(UnderstoodTable { table, head, plan })
+    Ok(UnderstoodTable::new(table, head, counted, mapping, &file))
 }
 
 /// Rows and notes of a table under its plan.
-fn read_understood(
-    understood: &UnderstoodTable,
+fn read_planned(
+    table: &dyn Table,
+    head: &Head,
+    plan: &ReadPlan,
+    assembled: Option<Assembled>,
     mapping: &Mapping,
     file: &str,
 ) -> Result<ReadRecording, RecordingError> {
-    let UnderstoodTable { table, head, plan } = understood;
-    let plan = plan.as_ref().map_err(RecordingError::copy_error)?;
-    let mut done = assemble::assemble_recordings(table.as_ref(), head, plan, mapping, file)?;
+    let mut done = match assembled {
+        Some(done) => done,
+        None => assemble::assemble_recordings(table, head, &plan.blocks, mapping, file)?,
+    };
     let together = mapping.time.clocks.as_deref() == Some("rows");
     let mut notes: Vec<Note> =
         table.describe_form().into_iter().map(|text| Note { kind: NoteKind::Assumption, text }).collect();
@@ -181,6 +200,8 @@ fn read_understood(
     Ok(ReadRecording { recording, problems: done.problems, refused: done.refused, notes: said })
 }
 
+#[cfg(test)]
+mod one_pass_tests;
 #[cfg(test)]
 mod stranger_tests;
 #[cfg(test)]

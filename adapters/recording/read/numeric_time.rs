@@ -40,7 +40,7 @@ impl ForeignColumns<'_> {
         let days = |x: f64| x / 1e6;
         if unit.as_deref() == Some("ms")
             && self.mapping.time.unit.is_none()
-            && survey.range.is_some_and(|(low, high)| days(low) > EXCEL_DAYS.0 && days(high) < EXCEL_DAYS.1)
+            && survey.find_range().is_some_and(|(low, high)| days(low) > EXCEL_DAYS.0 && days(high) < EXCEL_DAYS.1)
         {
             say(
                 format!("{}: millionths of days since 1899-12-30, as WinCC counts them", name.text),
@@ -62,7 +62,7 @@ impl ForeignColumns<'_> {
         if is_ours {
             return Ok(TimeKind::Seconds { decimal, factor: 1.0, offset_s: 0.0 });
         }
-        if let Some((low, high)) = survey.range
+        if let Some((low, high)) = survey.find_range()
             && let Some(epoch) = find_epoch(low, high)
         {
             let Epoch { factor, epoch_s, word } = epoch;
@@ -101,7 +101,7 @@ impl ForeignColumns<'_> {
     /// Spreadsheet days: of this century, and their steps are round in seconds but not as they stand.
     fn looks_like_days(&self, index: usize) -> bool {
         let survey = &self.surveys[index];
-        let (Some((low, high)), Some(step)) = (survey.range, survey.mean_step()) else { return false };
+        let (Some((low, high)), Some(step)) = (survey.find_range(), survey.mean_step()) else { return false };
         let is_round = |step: f64| {
             let parts = step * 100.0;
             (parts - parts.round()).abs() < 0.02 && parts.round() >= 1.0

@@ -5,7 +5,7 @@ use super::input::Input;
 use super::mapping::Mapping;
 use super::names::ForeignName;
 use super::plan::TimePlan;
-use super::{ReadRecording, read_understood, understand_input};
+use super::{ReadRecording, UnderstoodTable, read_planned, understand_input};
 use crate::{Cells, Column, Recording};
 use adapter_core::bilingual::Bilingual;
 use std::path::Path;
@@ -56,13 +56,18 @@ pub struct Preview {
 pub fn preview_recording(path: &Path, mapping: &Mapping) -> Result<Preview, RecordingError> {
     let input = Input::from_path(path);
     let file = input.file.clone();
-    let understood = understand_input(input, mapping)?;
-    let read = read_understood(&understood, mapping, &file);
-    let blocks = understood.plan.as_ref().map_or(&[][..], |plan| &plan.blocks);
-    let names = &understood.head.names;
+    let UnderstoodTable { table, head, plan, recordings } = understand_input(input, mapping)?;
+    let (blocks, read) = match plan {
+        Ok(plan) => {
+            let read = read_planned(table.as_ref(), &head, &plan, recordings, mapping, &file);
+            (plan.blocks, read)
+        }
+        Err(error) => (Vec::new(), Err(error)),
+    };
+    let names = &head.names;
     let columns = (0..names.len())
         .map(|index| {
-            let name = ForeignName::from_text(&names[index], understood.head.units[index].as_deref());
+            let name = ForeignName::from_text(&names[index], head.units[index].as_deref());
             let planned = blocks.iter().flat_map(|block| &block.columns).find(|column| column.index == index);
             let is_time = blocks.iter().any(|block| block.time.uses_column(index));
             ColumnPreview {

@@ -1,5 +1,6 @@
 //! Text on its way, divided into rows and cells: quotes are understood, lines are counted, every row is bounded.
 
+use super::cell::Cell;
 use super::error::RecordingError;
 use super::limits::{COLUMNS_MAX, ROW_BYTES_MAX};
 use super::table::VisitStep;
@@ -11,7 +12,7 @@ pub(super) enum SplitError {
     Visit(RecordingError),
 }
 
-pub(super) type SeeTexts<'v> = dyn FnMut(u64, &[&str]) -> Result<VisitStep, RecordingError> + 'v;
+pub(super) type SeeCells<'v> = dyn FnMut(u64, &[Cell<'_>]) -> Result<VisitStep, RecordingError> + 'v;
 
 /// Divides text into rows and cells, piece by piece.
 pub(super) struct Splitter {
@@ -44,7 +45,7 @@ impl Splitter {
         &mut self,
         bytes: &[u8],
         last: bool,
-        see: &mut SeeTexts<'_>,
+        see: &mut SeeCells<'_>,
     ) -> Result<VisitStep, SplitError> {
         match self.separator {
             Separator::Sign(_) => {
@@ -60,7 +61,7 @@ impl Splitter {
     }
 
     /// An empty slice is the end.
-    fn feed_csv(&mut self, mut bytes: &[u8], see: &mut SeeTexts<'_>) -> Result<VisitStep, SplitError> {
+    fn feed_csv(&mut self, mut bytes: &[u8], see: &mut SeeCells<'_>) -> Result<VisitStep, SplitError> {
         let at_end = bytes.is_empty();
         loop {
             if self.filled == (0, 0) {
@@ -107,10 +108,10 @@ impl Splitter {
     fn feed_plain_rows<'b>(
         &mut self,
         mut bytes: &'b [u8],
-        see: &mut SeeTexts<'_>,
+        see: &mut SeeCells<'_>,
     ) -> Result<(&'b [u8], VisitStep), SplitError> {
         let Separator::Sign(sign) = self.separator else { return Ok((bytes, VisitStep::Next)) };
-        let mut texts: Vec<&str> = Vec::new();
+        let mut cells: Vec<Cell<'b>> = Vec::new();
         while let Some(end) = memchr::memchr(b'\n', bytes) {
             let line = bytes[..end].strip_suffix(b"\r").unwrap_or(&bytes[..end]);
             if memchr::memchr2(b'"', b'\r', line).is_some() {
@@ -123,41 +124,41 @@ impl Splitter {
             if text.is_empty() {
                 continue;
             }
-            texts.clear();
+            cells.clear();
             let mut start = 0;
             for at in memchr::memchr_iter(sign, line) {
-                texts.push(trim_cell(&text[start..at]));
+                cells.push(build_cell(&text[start..at]));
                 start = at + 1;
             }
-            texts.push(trim_cell(&text[start..]));
-            if texts.len() > COLUMNS_MAX {
+            cells.push(build_cell(&text[start..]));
+            if cells.len() > COLUMNS_MAX {
                 return Err(SplitError::TooLong(self.newlines));
             }
-            if matches!(see(self.newlines, &texts).map_err(SplitError::Visit)?, VisitStep::Enough) {
+            if matches!(see(self.newlines, &cells).map_err(SplitError::Visit)?, VisitStep::Enough) {
                 return Ok((bytes, VisitStep::Enough));
             }
         }
         Ok((bytes, VisitStep::Next))
     }
 
-    fn emit_row(&self, end: u64, see: &mut SeeTexts<'_>) -> Result<VisitStep, SplitError> {
-        let (length, cells) = self.filled;
+    fn emit_row(&self, end: u64, see: &mut SeeCells<'_>) -> Result<VisitStep, SplitError> {
+        let (length, count) = self.filled;
         let text = String::from_utf8_lossy(&self.text[..length]);
         // A cell of replaced characters would move the ends; the decoder gives UTF-8, so nothing is replaced.
         if text.len() != length {
             return Ok(VisitStep::Next);
         }
         let mut start = 0;
-        let mut texts = Vec::with_capacity(cells);
-        for end in &self.ends[..cells] {
-            texts.push(trim_cell(text.get(start..*end).unwrap_or("")));
+        let mut cells = Vec::with_capacity(count);
+        for end in &self.ends[..count] {
+            cells.push(build_cell(text.get(start..*end).unwrap_or("")));
             start = *end;
         }
         let inner = text.matches('\n').count() as u64;
-        see(end.saturating_sub(inner).max(1), &texts).map_err(SplitError::Visit)
+        see(end.saturating_sub(inner).max(1), &cells).map_err(SplitError::Visit)
     }
 
-    fn feed_spaced(&mut self, bytes: &[u8], last: bool, see: &mut SeeTexts<'_>) -> Result<VisitStep, SplitError> {
+    fn feed_spaced(&mut self, bytes: &[u8], last: bool, see: &mut SeeCells<'_>) -> Result<VisitStep, SplitError> {
         for byte in bytes {
             if *byte != b'\n' {
                 if self.spaced.len() >= ROW_BYTES_MAX {
@@ -171,7 +172,7 @@ impl Splitter {
         if last && !self.spaced.is_empty() { self.spaced_row(see) } else { Ok(VisitStep::Next) }
     }
 
-    fn spaced_row(&mut self, see: &mut SeeTexts<'_>) -> Result<VisitStep, SplitError> {
+    fn spaced_row(&mut self, see: &mut SeeCells<'_>) -> Result<VisitStep, SplitError> {
         let line = std::mem::take(&mut self.spaced);
         let text = String::from_utf8_lossy(&line);
         let cells = spaced_cells(text.trim());
@@ -193,8 +194,13 @@ fn trim_cell(text: &str) -> &str {
     text.trim_matches(['\u{feff}', ' ', '\t', '\r', '\n', '\u{a0}', '\u{3000}'])
 }
 
+fn build_cell(text: &str) -> Cell<'_> {
+    let text = trim_cell(text);
+    if text.is_empty() { Cell::Empty } else { Cell::Text(text) }
+}
+
 /// Cells between spaces; a quoted cell may hold spaces.
-fn spaced_cells(text: &str) -> Vec<&str> {
+fn spaced_cells(text: &str) -> Vec<Cell<'_>> {
     let mut cells = Vec::new();
     let mut rest = text.trim_start();
     while !rest.is_empty() {
@@ -203,7 +209,7 @@ fn spaced_cells(text: &str) -> Vec<&str> {
             Some((inner, end)) => (&inner[..end], &inner[end + 1..]),
             None => rest.split_at(rest.find(char::is_whitespace).unwrap_or(rest.len())),
         };
-        cells.push(cell);
+        cells.push(if cell.is_empty() { Cell::Empty } else { Cell::Text(cell) });
         rest = next.trim_start();
     }
     cells

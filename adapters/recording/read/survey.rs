@@ -6,7 +6,8 @@ use super::error::RecordingError;
 use super::head::Head;
 use super::moment::{OrderEvidence, written_moment};
 use super::plain_number::scan_plain_number;
-use super::table::{Row, Table, VisitStep};
+use super::row_class::{RowClass, classify_row};
+use super::table::{Table, VisitStep};
 use adapter_core::clock::SECOND_NS;
 use std::collections::BTreeMap;
 
@@ -61,12 +62,41 @@ pub(super) struct ColumnSurvey {
     pub(super) word_examples: Vec<Example>,
     last_word: String,
     last_is_flag: bool,
-    /// Of the numbers, under a decimal point: least, greatest, whether each is the one before plus one.
-    pub(super) range: Option<(f64, f64)>,
-    first: Option<f64>,
-    last: Option<f64>,
-    pub(super) counts_rows: bool,
-    steps: u64,
+    numbers: NumberSeries,
+}
+
+/// What the numbers of a column are, one after the other, under a decimal point.
+#[derive(Debug, Clone, Copy)]
+struct NumberSeries {
+    count: u64,
+    first: f64,
+    last: f64,
+    least: f64,
+    greatest: f64,
+    /// Each was the one before plus one.
+    is_counting: bool,
+}
+
+impl Default for NumberSeries {
+    fn default() -> Self {
+        let (least, greatest) = (f64::INFINITY, f64::NEG_INFINITY);
+        Self { count: 0, first: 0.0, last: 0.0, least, greatest, is_counting: true }
+    }
+}
+
+impl NumberSeries {
+    #[expect(clippy::float_cmp, reason = "a row number is a whole number, exactly")]
+    fn record_number(&mut self, number: f64) {
+        if self.count == 0 {
+            self.first = number;
+        } else if self.is_counting {
+            self.is_counting = number == self.last + 1.0;
+        }
+        self.count += 1;
+        self.last = number;
+        self.least = self.least.min(number);
+        self.greatest = self.greatest.max(number);
+    }
 }
 
 impl ColumnSurvey {
@@ -81,17 +111,28 @@ impl ColumnSurvey {
 
     /// Mean step from one number to the next.
     pub(super) fn mean_step(&self) -> Option<f64> {
-        let (first, last) = self.first.zip(self.last)?;
+        let NumberSeries { count, first, last, .. } = self.numbers;
         #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
-        (self.steps > 0).then(|| (last - first) / self.steps as f64)
+        (count > 1).then(|| (last - first) / (count - 1) as f64)
     }
 
-    fn record_cell(&mut self, line: u64, cell: Cell<'_>) {
+    /// Least and greatest number.
+    pub(super) fn find_range(&self) -> Option<(f64, f64)> {
+        (self.numbers.count > 0).then_some((self.numbers.least, self.numbers.greatest))
+    }
+
+    /// Is each number the one before plus one?
+    pub(super) fn counts_rows(&self) -> bool {
+        self.numbers.count > 1 && self.numbers.is_counting
+    }
+
+    /// Counts a cell; its number, where it is a plain one under a decimal point.
+    fn record_cell(&mut self, line: u64, cell: Cell<'_>) -> Option<f64> {
         match cell {
             Cell::Empty => self.absent += 1,
             Cell::Number(number) if number.is_finite() => {
                 self.typed += 1;
-                self.record_number(number);
+                self.numbers.record_number(number);
                 // Fourteen digits are exact in a double.
                 if (1e13..1e14).contains(&number) || (1e7..1e8).contains(&number) {
                     self.see_digits(&number.to_string());
@@ -107,11 +148,12 @@ impl ColumnSurvey {
                 self.locals += 1;
                 self.dates += u64::from(at_ns.rem_euclid(86_400 * SECOND_NS) == 0);
             }
-            Cell::Text(text) => self.see_text(line, text),
+            Cell::Text(text) => return self.see_text(line, text),
         }
+        None
     }
 
-    fn see_text(&mut self, line: u64, text: &str) {
+    fn see_text(&mut self, line: u64, text: &str) -> Option<f64> {
         if let Some(number) = scan_plain_number(text, Decimal::Point) {
             match number.shape {
                 Shape::Whole => {
@@ -124,14 +166,17 @@ impl ColumnSurvey {
                     self.point_example.get_or_insert_with(|| Example { line, text: text.to_owned() });
                 }
             }
-            self.record_number(number.value);
-        } else if self.last_word == text && !text.is_empty() {
+            self.numbers.record_number(number.value);
+            return Some(number.value);
+        }
+        if self.last_word == text && !text.is_empty() {
             // As the row before: most columns of words go on for a while.
             self.words += u64::from(!self.last_is_flag);
             self.flags += u64::from(self.last_is_flag);
         } else {
             self.see_other_text(line, text);
         }
+        None
     }
 
     /// A text that is no plain number.
@@ -156,7 +201,7 @@ impl ColumnSurvey {
             self.see_suffix(number.suffix);
             self.see_digits(text);
             if let Some(number) = number.parse_value(Decimal::Point) {
-                self.record_number(number);
+                self.numbers.record_number(number);
             }
         } else if let Some(moment) = written_moment(text) {
             match (moment.date, moment.time_of_day_ns) {
@@ -222,83 +267,35 @@ impl ColumnSurvey {
             _ => {}
         }
     }
-
-    #[expect(clippy::float_cmp, reason = "a row number is a whole number, exactly")]
-    fn record_number(&mut self, number: f64) {
-        self.range = Some(self.range.map_or((number, number), |(low, high)| (low.min(number), high.max(number))));
-        self.first.get_or_insert(number);
-        if let Some(last) = self.last {
-            self.counts_rows = (self.steps == 0 || self.counts_rows) && number == last + 1.0;
-            self.steps += 1;
-        }
-        self.last = Some(number);
-    }
 }
 
 /// The survey of a table.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Survey {
     pub(super) columns: Vec<ColumnSurvey>,
-    pub(super) rows: u64,
-    /// Rows whose width differs from that of the header, beyond empty cells at their end.
-    pub(super) odd_widths: u64,
-    /// The header as data, again.
-    pub(super) repeated_headers: Vec<u64>,
 }
 
-/// Is this row the header once more?
-pub(super) fn repeats_header(row: &Row<'_>, head: &Head) -> bool {
-    let same = |(cell, name): (&Cell<'_>, &String)| match cell {
-        Cell::Text(text) => text == name || text.trim_start_matches('#').trim() == name,
-        Cell::Empty => name.is_empty(),
-        _ => false,
-    };
-    row.cells.len() >= head.names.len() && row.cells.iter().zip(&head.names).all(same)
-}
+impl Survey {
+    /// Of a table under this head, before its first row.
+    pub(super) fn new(head: &Head) -> Self {
+        Self { columns: vec![ColumnSurvey::default(); head.names.len()] }
+    }
 
-/// First cells of the lines that InfluxDB writes before every table of its annotated CSV.
-const ANNOTATIONS: [&str; 3] = ["#group", "#datatype", "#default"];
-
-/// Does the row say of what kind the columns of the next table are?
-pub(super) fn is_annotation(row: &Row<'_>) -> bool {
-    matches!(row.cells.first(), Some(Cell::Text(text)) if ANNOTATIONS.contains(text))
-}
-
-/// A line of remarks among the data: a sign before it, and not as many cells as there are columns.
-pub(super) fn is_comment(row: &Row<'_>, head: &Head) -> bool {
-    matches!(row.cells.first(), Some(Cell::Text(text)) if text.starts_with('#') || text.starts_with("//"))
-        && (is_annotation(row) || row.cells.iter().filter(|cell| **cell != Cell::Empty).count() < head.names.len())
-}
-
-/// The cells of a row that belong to columns with a name; `None` where the row is wider or narrower than the header.
-pub(super) fn fit_row<'a>(row: &Row<'a>, head: &Head, may_be_short: bool) -> Option<&'a [Cell<'a>]> {
-    let width = head.names.len();
-    if row.cells.len() >= width {
-        row.cells[width..].iter().all(|cell| *cell == Cell::Empty).then(|| &row.cells[..width])
-    } else {
-        may_be_short.then_some(row.cells)
+    /// Counts the cells of a row of data; `plain` takes the number of each cell that is a plain one under a decimal point.
+    pub(super) fn record_row(&mut self, line: u64, cells: &[Cell<'_>], plain: &mut Vec<Option<f64>>) {
+        plain.clear();
+        plain.extend(self.columns.iter_mut().zip(cells).map(|(column, cell)| column.record_cell(line, *cell)));
     }
 }
 
 /// Goes through the whole table.
 pub(super) fn survey_table(table: &dyn Table, head: &Head) -> Result<Survey, RecordingError> {
-    let mut found = Survey { columns: vec![ColumnSurvey::default(); head.names.len()], ..Survey::default() };
+    let mut found = Survey::new(head);
     let short = table.may_be_short() || head.short;
+    let mut plain = Vec::new();
     table.visit_rows(&mut |row| {
-        if row.line < head.data_line {
-            return Ok(VisitStep::Next);
-        }
-        if repeats_header(row, head) {
-            found.repeated_headers.push(row.line);
-            return Ok(VisitStep::Next);
-        }
-        let Some(cells) = fit_row(row, head, short).filter(|_| !is_comment(row, head)) else {
-            found.odd_widths += 1;
-            return Ok(VisitStep::Next);
-        };
-        found.rows += 1;
-        for (column, cell) in found.columns.iter_mut().zip(cells) {
-            column.record_cell(row.line, *cell);
+        if let RowClass::Data(cells) = classify_row(row, head, short) {
+            found.record_row(row.line, cells, &mut plain);
         }
         Ok(VisitStep::Next)
     })?;

@@ -74,7 +74,7 @@ fn find_target(
         return mapped_target(columns, index, mapped);
     }
     if name.text.is_empty() {
-        if survey.count_filled() > 0 && !survey.counts_rows {
+        if survey.count_filled() > 0 && !survey.counts_rows() {
             notes.push(Note::new(
                 NoteKind::Loss,
                 format!("column {} has no name and is left out", index + 1),

@@ -21,6 +21,9 @@ pub(super) enum Separator {
     Space,
 }
 
+/// What may stand before a text in UTF-8.
+const UTF_8_MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// Tried in this order; the first of equally good ones is taken.
 const CANDIDATES: [Separator; 5] =
     [Separator::Sign(b','), Separator::Sign(b';'), Separator::Sign(b'\t'), Separator::Sign(b'|'), Separator::Space];
@@ -69,6 +72,8 @@ pub(super) struct TextTable {
     separator_line: bool,
     /// Rows may leave out cells at their end.
     pub(super) short: bool,
+    /// It stands in memory and is UTF-8 throughout.
+    needs_no_decoding: bool,
 }
 
 impl TextTable {
@@ -83,9 +88,17 @@ impl TextTable {
             Some(encoding) => DetectedEncoding { encoding, has_mark: false },
             None => detect_encoding(&input)?,
         };
-        let separator_found = Separator::Sign(b',');
-        let mut table =
-            Self { input, encoding, separator: separator_found, is_given, separator_line: false, short: false };
+        let needs_no_decoding = encoding.encoding == encoding_rs::UTF_8
+            && input.bytes_in_memory().is_some_and(|bytes| std::str::from_utf8(bytes).is_ok());
+        let mut table = Self {
+            input,
+            encoding,
+            separator: Separator::Sign(b','),
+            is_given,
+            separator_line: false,
+            short: false,
+            needs_no_decoding,
+        };
         let head = table.read_head()?;
         let told = told_separator(&head);
         table.separator_line = told.is_some();
@@ -111,7 +124,17 @@ impl TextTable {
         Ok(String::from_utf8_lossy(&head).into_owned())
     }
 
-    fn too_long(&self, line: u64) -> RecordingError {
+    /// The text as it stands in memory, where nothing has to be decoded.
+    fn text_in_memory(&self) -> Option<&[u8]> {
+        let bytes = self.input.bytes_in_memory().filter(|_| self.needs_no_decoding)?;
+        Some(bytes.strip_prefix(UTF_8_MARK).unwrap_or(bytes))
+    }
+
+    fn build_split_error(&self, error: SplitError) -> RecordingError {
+        let line = match error {
+            SplitError::TooLong(line) => line,
+            SplitError::Visit(error) => return error,
+        };
         let file = &self.input.file;
         RecordingError::Header {
             file: file.clone(),
@@ -155,7 +178,7 @@ fn score_separator(head: &str, separator: Separator) -> f64 {
     let mut rows: Vec<Vec<bool>> = Vec::new();
     let mut splitter = Splitter::new(separator);
     let done = splitter.feed_bytes(head.as_bytes(), true, &mut |_, cells| {
-        rows.push(cells.iter().map(|cell| is_meant(cell)).collect());
+        rows.push(cells.iter().map(|cell| is_meant(*cell)).collect());
         Ok(if rows.len() < JUDGED_ROWS { VisitStep::Next } else { VisitStep::Enough })
     });
     if done.is_err() || rows.is_empty() {
@@ -177,7 +200,8 @@ fn score_separator(head: &str, separator: Separator) -> f64 {
 }
 
 /// Is this a number, a moment, a flag, nothing, or a word without any separator in it?
-fn is_meant(cell: &str) -> bool {
+fn is_meant(cell: Cell<'_>) -> bool {
+    let Cell::Text(cell) = cell else { return true };
     is_absent(cell)
         || written_number(cell).is_some()
         || written_moment(cell).is_some()
@@ -187,29 +211,24 @@ fn is_meant(cell: &str) -> bool {
 
 impl Table for TextTable {
     fn visit_rows(&self, see: &mut Visit<'_>) -> Result<(), RecordingError> {
-        let mut text = Decoded::new(self.input.open()?, self.encoding);
         let mut splitter = Splitter::new(self.separator);
-        let mut chunk = vec![0; 64 << 10];
-        let mut cells: Vec<Cell<'static>> = Vec::new();
         let mut skip = self.separator_line;
+        let mut see_row = |line: u64, cells: &[Cell<'_>]| {
+            if std::mem::take(&mut skip) { Ok(VisitStep::Next) } else { see(&Row { line, cells }) }
+        };
+        if let Some(text) = self.text_in_memory() {
+            splitter.feed_bytes(text, true, &mut see_row).map_err(|error| self.build_split_error(error))?;
+            return Ok(());
+        }
+        let mut text = Decoded::new(self.input.open()?, self.encoding);
+        let mut chunk = vec![0; 64 << 10];
         loop {
             let length = text.read(&mut chunk).map_err(|error| self.input.build_io_error(error))?;
-            let fed = splitter.feed_bytes(&chunk[..length], length == 0, &mut |line, texts| {
-                if std::mem::take(&mut skip) {
-                    return Ok(VisitStep::Next);
-                }
-                let mut row = reuse_cells(std::mem::take(&mut cells));
-                row.extend(texts.iter().map(|text| if text.is_empty() { Cell::Empty } else { Cell::Text(text) }));
-                let step = see(&Row { line, cells: &row });
-                cells = reuse_cells(row);
-                step
-            });
-            match fed {
-                Ok(VisitStep::Enough) => return Ok(()),
-                Ok(VisitStep::Next) if length == 0 => return Ok(()),
-                Ok(VisitStep::Next) => {}
-                Err(SplitError::TooLong(line)) => return Err(self.too_long(line)),
-                Err(SplitError::Visit(error)) => return Err(error),
+            let step = splitter
+                .feed_bytes(&chunk[..length], length == 0, &mut see_row)
+                .map_err(|error| self.build_split_error(error))?;
+            if length == 0 || matches!(step, VisitStep::Enough) {
+                return Ok(());
             }
         }
     }
@@ -244,12 +263,6 @@ impl Table for TextTable {
             format!("字符按{name}读取；如列名有误，请在映射文件中指定编码（encoding = \"GBK\"）"),
         )]
     }
-}
-
-/// The same allocation for cells of another life.
-fn reuse_cells<'a>(mut cells: Vec<Cell<'_>>) -> Vec<Cell<'a>> {
-    cells.clear();
-    cells.into_iter().map(|_| Cell::Empty).collect()
 }
 
 #[cfg(test)]

@@ -7,8 +7,8 @@ use super::load_inputs::{LoadChannels, LoadMoment};
 use super::place::Place;
 use crate::NoEstimate;
 use crate::signals::seconds_between;
-use adapter_core::Sample;
 use adapter_core::clock::TimeNs;
+use adapter_core::{Sample, is_same_text};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -189,12 +189,13 @@ impl LearnedLoad {
     /// The key is put together only where one of its texts has changed.
     fn follow_place(&mut self, sample: &Sample, channels: &LoadChannels) {
         let ids = [channels.program, channels.tool, channels.operation, channels.block];
-        let same = ids.iter().zip(&self.texts.0).all(|(id, known)| sample.text(*id) == known.as_deref());
+        let same =
+            ids.iter().zip(&self.texts.0).all(|(id, known)| is_same_text(sample.shared_text(*id), known.as_ref()));
         if same {
             return;
         }
         let block_before = self.texts.0[3].clone();
-        self.texts = PlaceTexts(ids.map(|id| sample.text(id).map(Arc::from)));
+        self.texts = PlaceTexts(ids.map(|id| sample.shared_text(id).cloned()));
         let [program, tool, operation, block] = &self.texts.0;
         let (other_block, key_before) = (*block != block_before, self.key.take());
         self.key = program.as_ref().zip(tool.as_ref()).map(|(program, tool)| {

@@ -4,7 +4,7 @@ use super::curves::LoadCurves;
 use super::follower::OverrideRange;
 use super::load_inputs::LoadChannels;
 use crate::settings::Settings;
-use adapter_core::Sample;
+use adapter_core::{Sample, is_same_text};
 use std::sync::Arc;
 
 /// Work that takes more than was learned is no emergency; a disturbed reading of a meter with 5 Hz stands for 0.4 s in the filtered
@@ -39,19 +39,18 @@ pub(super) struct LearnedLimits {
 /// All of them, and what they are of.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LoadSettings {
-    tool: String,
-    operation: String,
+    tool: Option<Arc<str>>,
+    operation: Option<Arc<str>>,
     pub(super) constant: ConstantLimits,
     pub(super) learned: LearnedLimits,
 }
 
 impl LoadSettings {
     pub(super) fn from_settings(settings: &Settings, sample: &Sample, channels: &LoadChannels) -> Self {
-        let text = |channel| sample.text(channel).unwrap_or_default();
-        let (tool, operation) = (text(channels.tool), text(channels.operation));
+        let (tool, operation) = (sample.shared_text(channels.tool), sample.shared_text(channels.operation));
         let own;
         let settings = if settings.has_places() {
-            own = settings.resolve_for_place(tool, operation);
+            own = settings.resolve_for_place(tool.map_or("", |tool| tool), operation.map_or("", |operation| operation));
             &own
         } else {
             settings
@@ -86,12 +85,12 @@ impl LoadSettings {
                 sure_s: LEARNED_SURE_S,
             },
         };
-        Self { tool: tool.to_owned(), operation: operation.to_owned(), constant, learned }
+        Self { tool: tool.cloned(), operation: operation.cloned(), constant, learned }
     }
 
     /// Do they hold for this sample?
     pub(super) fn applies_to_sample(&self, sample: &Sample, channels: &LoadChannels) -> bool {
-        let text = |channel| sample.text(channel).unwrap_or_default();
-        self.tool == text(channels.tool) && self.operation == text(channels.operation)
+        is_same_text(self.tool.as_ref(), sample.shared_text(channels.tool))
+            && is_same_text(self.operation.as_ref(), sample.shared_text(channels.operation))
     }
 }

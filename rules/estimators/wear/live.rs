@@ -12,9 +12,10 @@ use super::record::{WearKey, WearRecord};
 use super::threshold::{Observability, PowerLimit, compute_power_limit};
 use super::tool_name::tool_of;
 use super::work::{CutMoment, EdgeWork, ExpectedPower, WorkKey, WorkReference};
+use crate::loads::Figure;
 use crate::{Estimate, Estimated, Estimates, NoEstimate, State};
 use adapter_core::clock::{SECOND_NS, TimeNs};
-use adapter_core::{ChannelId, Sample};
+use adapter_core::{ChannelId, Sample, is_same_text};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -78,13 +79,28 @@ pub struct WearEstimator {
     machine: String,
     models: Vec<Arc<WearRecord>>,
     channels: WearChannels,
-    texts: [String; 3],
+    /// Tool, material and operation.
+    texts: [Option<Arc<str>>; 3],
     model: Option<ModelInUse>,
     memory: SavedWear,
     last_ns: Option<TimeNs>,
     limit: Option<Result<PowerLimit, String>>,
     limit_ns: Option<TimeNs>,
     news: Vec<WearNews>,
+    /// Of the edge in use. They change when a part is finished or another edge is in use; until then they are not computed again.
+    figures: Option<EdgeFigures>,
+}
+
+/// What is known of an edge after its last part.
+#[derive(Debug, Clone, Copy)]
+struct EdgeFigures {
+    wear_mm: Estimated,
+    growth_pct: Estimated,
+    worn_probability: Estimated,
+    parts_left: Estimated,
+    limit_parts: Figure,
+    life_share: Figure,
+    material_level_pct: Estimated,
 }
 
 impl Default for WearEstimator {
@@ -100,11 +116,16 @@ impl Default for WearEstimator {
             limit: None,
             limit_ns: None,
             news: Vec::new(),
+            figures: None,
         }
     }
 }
 
 impl WearEstimator {
+    fn edge_in_use(&self) -> &str {
+        self.texts[0].as_deref().unwrap_or_default()
+    }
+
     /// The models in force, the newest last, and the name of the machine for which they are looked up.
     pub fn set_models(&mut self, machine: &str, models: Vec<Arc<WearRecord>>) {
         machine.clone_into(&mut self.machine);
@@ -132,7 +153,7 @@ impl WearEstimator {
     /// How the edge in use stands after its last part.
     #[must_use]
     pub fn current_outlook(&self) -> Option<(WorkReference, Outlook)> {
-        self.memory.follower.find_outlook(&self.texts[0])
+        self.memory.follower.find_outlook(self.edge_in_use())
     }
 
     /// Everything remembered, for [`WearEstimator::restore_snapshot`].
@@ -146,6 +167,7 @@ impl WearEstimator {
         let memory = serde_json::from_value(snapshot).ok().filter(|memory: &SavedWear| memory.follower.is_sound());
         let known = memory.is_some();
         self.memory = memory.unwrap_or_default();
+        self.figures = None;
         known
     }
 
@@ -188,15 +210,17 @@ impl WearEstimator {
     /// Another tool, material or operation may have another model.
     fn follow_texts(&mut self, sample: &Sample) {
         let [tool, material, operation, _] = self.channels.texts;
-        let now = [tool, material, operation].map(|channel| sample.text(channel).unwrap_or_default());
-        if self.texts.iter().zip(now).any(|(before, now)| before != now) {
-            self.texts = now.map(str::to_owned);
+        let now = [tool, material, operation].map(|channel| sample.shared_text(channel));
+        if self.texts.iter().zip(now).any(|(before, now)| !is_same_text(before.as_ref(), now)) {
+            self.texts = now.map(Option::<&Arc<str>>::cloned);
+            self.figures = None;
             self.choose_model();
         }
     }
 
     fn choose_model(&mut self) {
-        let [tool, work_material, operation] = self.texts.clone();
+        let [tool, work_material, operation] =
+            self.texts.each_ref().map(|text| text.as_deref().unwrap_or_default().to_owned());
         let cut = WearKey { machine: self.machine.clone(), tool, work_material, operation };
         let found = choose_model(&self.models, &cut, |model| model);
         let model = found.map(|choice| ModelInUse { record: choice.record.clone(), by: choice.by });
@@ -222,14 +246,14 @@ impl WearEstimator {
     }
 
     fn find_or_add_work(&mut self, expected: ExpectedPower, program: &str, criterion_mm: f64) -> Option<&mut EdgeWork> {
-        let [edge, material, operation] = &self.texts;
+        let [edge, material, operation] = self.texts.each_ref().map(|text| text.as_deref().unwrap_or_default());
         let same = |work: &EdgeWork| {
             let key = &work.key;
             key.reference == expected.reference
-                && work.edge == *edge
-                && key.operation == *operation
+                && work.edge == edge
+                && key.operation == operation
                 && key.program == program
-                && key.work_material == *material
+                && key.work_material == material
         };
         let works = &mut self.memory.works;
         let at = works.iter().position(same).or_else(|| {
@@ -237,11 +261,11 @@ impl WearEstimator {
                 reference: expected.reference,
                 tool: tool_of(edge).to_owned(),
                 program: program.to_owned(),
-                operation: operation.clone(),
-                work_material: material.clone(),
+                operation: operation.to_owned(),
+                work_material: material.to_owned(),
             };
             (works.len() < WORKS_MAX).then(|| {
-                works.push(EdgeWork::new(key, edge.clone(), criterion_mm));
+                works.push(EdgeWork::new(key, edge.to_owned(), criterion_mm));
                 works.len() - 1
             })
         })?;
@@ -254,28 +278,40 @@ impl WearEstimator {
         let news = self.memory.follower.record_part(&works, at_ns as f64 / SECOND_NS as f64);
         self.news.extend(news);
         self.news.truncate(NEWS_MAX);
+        self.figures = None;
     }
 
     fn fill_estimates(&mut self, moment: Option<&CutMoment>, estimates: &mut Estimates) {
         estimates.wear_limit_w = self.limit_of(moment, estimates.at_ns);
-        let (wear, growth, probability, parts) = match self.current_outlook() {
-            None => {
-                let none = || Err(NoEstimate::NoPartYet);
-                (none(), none(), none(), none())
-            }
-            Some((_, outlook)) if !outlook.observed => {
-                let none = || Err(NoEstimate::NotObservable);
-                (none(), none(), none(), none())
-            }
-            Some((reference, outlook)) => build_wear_estimates(reference, &outlook),
+        let figures = match self.figures {
+            Some(known) => known,
+            None => self.compute_figures(),
         };
-        (estimates.tool_wear_mm, estimates.tool_growth_pct) = (wear, growth);
-        (estimates.tool_worn_probability, estimates.tool_parts_left) = (probability, parts);
-        let (limit_parts, life_share) = self.memory.follower.read_witnesses(&self.texts[0]);
-        estimates.tool_limit_parts = limit_parts.map(f64::from).ok_or(NoEstimate::NoModel);
-        estimates.tool_life_share = life_share.ok_or(NoEstimate::NoPartYet);
-        let material = self.memory.follower.material_level().ok_or(NoEstimate::NoPartYet);
-        estimates.material_level_pct = material.map(|(share, sd)| Estimate { value: 100.0 * share, sd: 100.0 * sd });
+        self.figures = Some(figures);
+        (estimates.tool_wear_mm, estimates.tool_growth_pct) = (figures.wear_mm, figures.growth_pct);
+        (estimates.tool_worn_probability, estimates.tool_parts_left) = (figures.worn_probability, figures.parts_left);
+        (estimates.tool_limit_parts, estimates.tool_life_share) = (figures.limit_parts, figures.life_share);
+        estimates.material_level_pct = figures.material_level_pct;
+    }
+
+    fn compute_figures(&self) -> EdgeFigures {
+        let follower = &self.memory.follower;
+        let (limit_parts, life_share) = follower.read_witnesses(self.edge_in_use());
+        let material = follower.material_level().ok_or(NoEstimate::NoPartYet);
+        let without = |reason: NoEstimate| EdgeFigures {
+            wear_mm: Err(reason),
+            growth_pct: Err(reason),
+            worn_probability: Err(reason),
+            parts_left: Err(reason),
+            limit_parts: limit_parts.map(f64::from).ok_or(NoEstimate::NoModel),
+            life_share: life_share.ok_or(NoEstimate::NoPartYet),
+            material_level_pct: material.map(|(share, sd)| Estimate { value: 100.0 * share, sd: 100.0 * sd }),
+        };
+        match self.current_outlook() {
+            None => without(NoEstimate::NoPartYet),
+            Some((_, outlook)) if !outlook.observed => without(NoEstimate::NotObservable),
+            Some((reference, outlook)) => fill_outlook(without(NoEstimate::NoModel), reference, &outlook),
+        }
     }
 
     fn limit_of(&mut self, moment: Option<&CutMoment>, at_ns: TimeNs) -> Estimated {
@@ -300,8 +336,8 @@ impl WearEstimator {
     }
 }
 
-fn build_wear_estimates(reference: WorkReference, outlook: &Outlook) -> (Estimated, Estimated, Estimated, Estimated) {
-    let learned = reference == WorkReference::Model;
+/// The figures of an edge whose wear is observed; in millimetres only where a model was learned.
+fn fill_outlook(figures: EdgeFigures, reference: WorkReference, outlook: &Outlook) -> EdgeFigures {
     let wear = Estimate { value: outlook.wear_mm, sd: outlook.wear_sd_mm };
     let growth = Estimate {
         value: 100.0 * TYPICAL_RISE_PER_MM * outlook.wear_mm,
@@ -310,8 +346,13 @@ fn build_wear_estimates(reference: WorkReference, outlook: &Outlook) -> (Estimat
     let [middle, least, most] = outlook.parts_left;
     // Half of an 80 % interval is 1.2816 standard deviations of a normal one.
     let parts = Estimate { value: middle, sd: (most - least) / (2.0 * 1.2816) };
-    let probability = Estimate { value: outlook.worn_probability, sd: 0.0 };
-    (if learned { Ok(wear) } else { Err(NoEstimate::NoModel) }, Ok(growth), Ok(probability), Ok(parts))
+    EdgeFigures {
+        wear_mm: if reference == WorkReference::Model { Ok(wear) } else { Err(NoEstimate::NoModel) },
+        growth_pct: Ok(growth),
+        worn_probability: Ok(Estimate { value: outlook.worn_probability, sd: 0.0 }),
+        parts_left: Ok(parts),
+        ..figures
+    }
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ mod matlab;
 mod mtconnect;
 mod opendocument;
 mod parquet;
+mod percent_cells;
 mod shdr;
 mod sparse_sheet;
 mod tdms;
@@ -18,7 +19,7 @@ mod workbook;
 use super::encoding::Decoded;
 use super::error::RecordingError;
 use super::input::Input;
-use super::limits::UNPACKED_BYTES_MAX;
+use super::limits::{TEXT_IN_MEMORY_MAX, UNPACKED_BYTES_MAX};
 use super::mapping::Mapping;
 use super::table::Table;
 use super::text::{Separator, TextTable};
@@ -38,6 +39,15 @@ fn catch_damage<T>(input: &Input, read: impl FnOnce() -> Result<T, RecordingErro
 
 /// Opens a file as a table.
 pub(super) fn open_table(input: Input, mapping: &Mapping) -> Result<Box<dyn Table>, RecordingError> {
+    open_table_within(input, mapping, TEXT_IN_MEMORY_MAX)
+}
+
+/// Opens a file as a table; a text of more than so many bytes is not put into memory.
+pub(super) fn open_table_within(
+    mut input: Input,
+    mapping: &Mapping,
+    most: u64,
+) -> Result<Box<dyn Table>, RecordingError> {
     let head = input.read_head(1024)?;
     unread::refuse_by_name(&head, &input)?;
     if head.starts_with(b"PAR1") {
@@ -55,6 +65,7 @@ pub(super) fn open_table(input: Input, mapping: &Mapping) -> Result<Box<dyn Tabl
     }
     let encoding = mapping.encoding.as_deref().and_then(|name| encoding_rs::Encoding::for_label(name.as_bytes()));
     let separator = mapping.separator.as_deref().and_then(Separator::from_text);
+    input.keep_in_memory(most)?;
     let text = TextTable::new(input, encoding, separator)?;
     let start = text.read_head()?;
     let start = start.trim_start();

@@ -5,10 +5,11 @@ use super::super::input::Input;
 use super::super::limits::{CELLS_IN_MEMORY_MAX, COLUMNS_MAX, UNPACKED_BYTES_MAX};
 use super::super::table::{MemoryTable, OwnedCell};
 use super::opendocument;
+use super::percent_cells::{PercentCells, find_percent_cells, has_percent_styles};
 use super::sparse_sheet::{SparseSheet, build_size_error, note_formulas};
 use adapter_core::bilingual::Bilingual;
 use adapter_core::clock::{SECOND_NS, TimeNs};
-use calamine::{Data, ExcelDateTime, Reader, Sheets};
+use calamine::{Data, DataRef, ExcelDateTime, Reader, Sheets};
 use std::io::{Cursor, Read};
 
 /// Days from 1899-12-30 to 1970-01-01.
@@ -24,11 +25,13 @@ pub(super) fn open(input: &Input, sheet: Option<&str>) -> Result<MemoryTable, Re
     } else if has_encrypted_package(&bytes) {
         return Err(build_password_error(input));
     }
+    let styled = has_percent_styles(&bytes).then(|| bytes.clone());
     let mut book =
         calamine::open_workbook_auto_from_rs(Cursor::new(bytes)).map_err(|error| build_broken_error(input, &error))?;
     let names = book.sheet_names();
     let chosen = choose_sheet(&mut book, &names, sheet, input)?;
-    let mut table = read_sheet(&mut book, &chosen, input)?;
+    let percent = styled.map(|bytes| find_percent_cells(&bytes, &chosen)).unwrap_or_default();
+    let mut table = read_sheet(&mut book, &chosen, percent, input)?;
     if names.len() > 1 {
         table.form.push(Bilingual::new(
             format!("sheet {chosen} of {}", names.len()),
@@ -40,14 +43,20 @@ pub(super) fn open(input: &Input, sheet: Option<&str>) -> Result<MemoryTable, Re
 
 /// The cells of a sheet. The newer formats are read cell by cell, so that a stray cell far away costs nothing; the library makes a block of
 /// the older ones, whose sheets are small.
-fn read_sheet(book: &mut Book, chosen: &str, input: &Input) -> Result<MemoryTable, RecordingError> {
+fn read_sheet(
+    book: &mut Book,
+    chosen: &str,
+    mut percent: PercentCells,
+    input: &Input,
+) -> Result<MemoryTable, RecordingError> {
     let (mut sheet, mut notes) = (SparseSheet::default(), Vec::new());
     let broken = |error: &dyn std::fmt::Display| build_broken_error(input, error);
     match book {
         Sheets::Xlsx(book) => {
             let mut cells = book.worksheet_cells_reader(chosen).map_err(|error| broken(&error))?;
             while let Some(cell) = cells.next_cell().map_err(|error| broken(&error))? {
-                sheet.put_cell(cell.get_position(), convert_cell(&Data::from(cell.get_value().clone())));
+                let own = convert_cell(&Data::from(cell.get_value().clone()));
+                sheet.put_cell(cell.get_position(), percent.show_cell(cell.get_position(), own));
                 sheet.check_size(chosen, input)?;
             }
             drop(cells);
@@ -109,10 +118,9 @@ fn choose_sheet(
     if let [only] = names {
         return Ok(only.clone());
     }
-    let size = |book: &mut Book, name: &String| count_cells(book, name, input);
     let mut best: Option<(usize, String)> = None;
     for name in names {
-        let cells = size(book, name);
+        let cells = count_filled_cells(book, name);
         if best.as_ref().is_none_or(|(most, _)| cells > *most) {
             best = Some((cells, name.clone()));
         }
@@ -122,12 +130,30 @@ fn choose_sheet(
         .ok_or_else(|| RecordingError::with_format_reason(&input.file, "the workbook is empty", "工作簿为空"))
 }
 
-/// How many cells of a sheet hold something; none of a sheet that cannot be read.
-fn count_cells(book: &mut Book, name: &str, input: &Input) -> usize {
-    let filled = |table: MemoryTable| {
-        table.rows.iter().flat_map(|(_, cells)| cells).filter(|cell| **cell != OwnedCell::Empty).count()
-    };
-    read_sheet(book, name, input).map_or(0, filled)
+/// How many cells of a sheet hold something; of a sheet that breaks off, those before. Nothing is converted or kept.
+fn count_filled_cells(book: &mut Book, name: &str) -> usize {
+    match book {
+        Sheets::Xlsx(book) => book.worksheet_cells_reader(name).map_or(0, |mut cells| {
+            std::iter::from_fn(|| cells.next_cell().ok().flatten().map(|cell| is_filled(cell.get_value())))
+                .filter(|filled| *filled)
+                .count()
+        }),
+        Sheets::Xlsb(book) => book.worksheet_cells_reader(name).map_or(0, |mut cells| {
+            std::iter::from_fn(|| cells.next_cell().ok().flatten().map(|cell| is_filled(cell.get_value())))
+                .filter(|filled| *filled)
+                .count()
+        }),
+        Sheets::Xls(_) | Sheets::Ods(_) => book.worksheet_range(name).map_or(0, |range| range.used_cells().count()),
+    }
+}
+
+fn is_filled(value: &DataRef<'_>) -> bool {
+    match value {
+        DataRef::Empty | DataRef::Error(_) => false,
+        DataRef::String(text) => !text.trim().is_empty(),
+        DataRef::SharedString(text) => !text.trim().is_empty(),
+        _ => true,
+    }
 }
 
 fn convert_cell(data: &Data) -> OwnedCell {
@@ -234,69 +260,5 @@ fn build_broken_error(input: &Input, error: &dyn std::fmt::Display) -> Recording
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::super::cell::Cell;
-    use super::super::super::table::{Table, VisitStep};
-    use super::*;
-    use std::io::Write;
-
-    /// A workbook of one sheet with these cells, as small as the format allows.
-    fn workbook(cells: &str) -> Input {
-        let kind = "http://schemas.openxmlformats.org";
-        let parts = [
-            (
-                "_rels/.rels",
-                format!(
-                    "<Relationships xmlns=\"{kind}/package/2006/relationships\"><Relationship Id=\"r1\" Type=\"{kind}/officeDocument/2006/relationships/officeDocument\" Target=\"xl/workbook.xml\"/></Relationships>"
-                ),
-            ),
-            (
-                "xl/_rels/workbook.xml.rels",
-                format!(
-                    "<Relationships xmlns=\"{kind}/package/2006/relationships\"><Relationship Id=\"r1\" Type=\"{kind}/officeDocument/2006/relationships/worksheet\" Target=\"worksheets/sheet1.xml\"/></Relationships>"
-                ),
-            ),
-            (
-                "xl/workbook.xml",
-                format!(
-                    "<workbook xmlns=\"{kind}/spreadsheetml/2006/main\" xmlns:r=\"{kind}/officeDocument/2006/relationships\"><sheets><sheet name=\"s\" sheetId=\"1\" r:id=\"r1\"/></sheets></workbook>"
-                ),
-            ),
-            (
-                "xl/worksheets/sheet1.xml",
-                format!(
-                    "<worksheet xmlns=\"{kind}/spreadsheetml/2006/main\"><sheetData>{cells}</sheetData></worksheet>"
-                ),
-            ),
-        ];
-        let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
-        for (name, text) in parts {
-            let stored = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
-            archive.start_file(name, stored).expect("a part");
-            archive.write_all(text.as_bytes()).expect("written");
-        }
-        Input::from_memory(archive.finish().expect("an archive").into_inner(), "t.xlsx")
-    }
-
-    const TABLE: &str = "<row r=\"2\"><c r=\"B2\" t=\"str\"><v>time_s</v></c><c r=\"D2\" t=\"str\"><v>p</v></c></row>\
-                         <row r=\"3\"><c r=\"B3\"><v>0</v></c><c r=\"D3\"><v>5</v></c></row>";
-
-    #[test]
-    fn a_stray_cell_far_away_costs_nothing() {
-        let stray = "<row r=\"1048576\"><c r=\"XFD1048576\"><v>1</v></c></row>";
-        for (cells, rows) in [(TABLE.to_owned(), 2), (format!("{TABLE}{stray}"), 2)] {
-            let table = open(&workbook(&cells), None).expect("a table");
-            let mut seen = Vec::new();
-            table
-                .visit_rows(&mut |row| {
-                    let filled = row.cells.iter().filter(|cell| !matches!(cell, Cell::Empty)).count();
-                    seen.push((row.line, row.cells.len(), filled));
-                    Ok(VisitStep::Next)
-                })
-                .expect("rows");
-            assert_eq!(seen, [(2, 3, 2), (3, 3, 2)], "{rows} rows, from the first column on");
-            let told = table.form.iter().any(|form| form.en.contains("1 cells further right"));
-            assert_eq!(told, cells.contains("XFD"), "what is left out is told");
-        }
-    }
-}
+#[path = "workbook_tests.rs"]
+mod tests;
