@@ -6,11 +6,12 @@
 use super::conditions::CutConditions;
 use super::edge_state::WearNews;
 use super::follow::WearFollower;
-use super::model_selection::choose_model;
+use super::model_selection::{choose_model, explain_no_model};
 use super::outlook::Outlook;
 use super::record::{WearKey, WearRecord};
 use super::threshold::{Observability, PowerLimit, compute_power_limit};
 use super::tool_name::tool_of;
+use super::unseen_edges::UnseenEdges;
 use super::work::{CutMoment, EdgeWork, ExpectedPower, WorkKey, WorkReference};
 use crate::{Estimate, Estimated, Estimates, NoEstimate, State};
 use adapter_core::clock::{SECOND_NS, TimeNs};
@@ -85,6 +86,7 @@ pub struct WearEstimator {
     limit: Option<Result<PowerLimit, String>>,
     limit_ns: Option<TimeNs>,
     news: Vec<WearNews>,
+    unseen: UnseenEdges,
 }
 
 impl Default for WearEstimator {
@@ -100,6 +102,7 @@ impl Default for WearEstimator {
             limit: None,
             limit_ns: None,
             news: Vec::new(),
+            unseen: UnseenEdges::default(),
         }
     }
 }
@@ -127,6 +130,28 @@ impl WearEstimator {
     #[must_use]
     pub fn limit(&self) -> Option<&Result<PowerLimit, String>> {
         self.limit.as_ref()
+    }
+
+    /// The same, where it is one that a power may be compared with: inside the cuts of the model, where wear can be seen.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn usable_limit(&self) -> Result<&PowerLimit, NoEstimate> {
+        match &self.limit {
+            None => Err(NoEstimate::NotCutting),
+            Some(Err(_)) => Err(NoEstimate::CutUnknown),
+            Some(Ok(limit)) if !limit.extrapolated.is_empty() => Err(NoEstimate::OutsideModel),
+            Some(Ok(limit)) if limit.observability == Observability::NotObservableHere => {
+                Err(NoEstimate::NotObservable)
+            }
+            Some(Ok(limit)) => Ok(limit),
+        }
+    }
+
+    /// Why no model of the library is for the cut of the moment, in a sentence; `None` where one is.
+    #[must_use]
+    pub fn explain_missing_model(&self) -> Option<String> {
+        self.model.is_none().then(|| explain_no_model(&self.models, &self.key_of_cut()))
     }
 
     /// How the edge in use stands after its last part.
@@ -160,6 +185,7 @@ impl WearEstimator {
         if counted || !(0..=PAUSE_NS).contains(&step_ns) {
             self.finish_part(sample.at_ns);
         }
+        self.unseen.watch_edge(&self.texts[0], estimates);
         let moment = self.read_cut_moment(sample, estimates);
         if let (Some(moment), 1..=STEP_MAX_NS) = (&moment, step_ns) {
             self.gather_work(moment, sample, step_ns as f64 / SECOND_NS as f64);
@@ -169,7 +195,7 @@ impl WearEstimator {
 
     /// The cut of this moment, where its power is known.
     fn read_cut_moment(&self, sample: &Sample, estimates: &Estimates) -> Option<CutMoment> {
-        let power = estimates.cutting_power_w.ok().filter(|_| estimates.state == State::Cutting)?;
+        let power = estimates.comparable_cutting_power().ok().filter(|_| estimates.state == State::Cutting)?;
         if sample.at_ns - estimates.since_ns < SETTLE_NS {
             return None;
         }
@@ -195,10 +221,13 @@ impl WearEstimator {
         }
     }
 
-    fn choose_model(&mut self) {
+    fn key_of_cut(&self) -> WearKey {
         let [tool, work_material, operation] = self.texts.clone();
-        let cut = WearKey { machine: self.machine.clone(), tool, work_material, operation };
-        let found = choose_model(&self.models, &cut, |model| model);
+        WearKey { machine: self.machine.clone(), tool, work_material, operation }
+    }
+
+    fn choose_model(&mut self) {
+        let found = choose_model(&self.models, &self.key_of_cut(), |model| model);
         let model = found.map(|choice| ModelInUse { record: choice.record.clone(), by: choice.by });
         let same = self.model.as_ref().map(|it| &it.record) == model.as_ref().map(|it| &it.record);
         self.model = model;
@@ -260,7 +289,7 @@ impl WearEstimator {
         estimates.wear_limit_w = self.limit_of(moment, estimates.at_ns);
         let (wear, growth, probability, parts) = match self.current_outlook() {
             None => {
-                let none = || Err(NoEstimate::NoPartYet);
+                let none = || Err(self.unseen.find_reason(&self.texts[0]).unwrap_or(NoEstimate::NoPartYet));
                 (none(), none(), none(), none())
             }
             Some((_, outlook)) if !outlook.observed => {
@@ -289,14 +318,7 @@ impl WearEstimator {
                 compute_power_limit(&record.model, &cut, record.criterion_mm).map_err(|refusal| refusal.to_string())
             }));
         }
-        match &self.limit {
-            Some(Ok(limit)) if !limit.extrapolated.is_empty() => Err(NoEstimate::OutsideModel),
-            Some(Ok(limit)) if limit.observability == Observability::NotObservableHere => {
-                Err(NoEstimate::NotObservable)
-            }
-            Some(Ok(limit)) => Ok(Estimate { value: limit.power_w, sd: limit.sd_w }),
-            _ => Err(NoEstimate::CutUnknown),
-        }
+        self.usable_limit().map(|limit| Estimate { value: limit.power_w, sd: limit.sd_w })
     }
 }
 
