@@ -142,7 +142,7 @@ impl<'a> SimulatedSpeedWeights<'a> {
         let n = speed_rpm.abs().clamp(least.min(speeds[0]), greatest.max(speeds[last]));
         for end in [0, last] {
             let outside = if end == 0 { n < speeds[end] } else { n > speeds[end] };
-            if outside && (n / speeds[end] - 1.0).abs() <= END_TOLERANCE {
+            if outside && (n - speeds[end]).abs() <= END_TOLERANCE * n {
                 return SpeedWeights { law: Weights::from_single_speed(end, n / speeds[end]), other: None };
             }
         }
