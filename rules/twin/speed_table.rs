@@ -15,7 +15,7 @@ pub struct SpeedTable {
 /// Where the law of a table is doubted most among the speeds of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FormDoubt {
-    /// The speed, rpm.
+    /// Spindle speed of the row, rpm.
     pub speed_rpm: f64,
     /// What the law gives there, in the unit of the table.
     pub power: f64,

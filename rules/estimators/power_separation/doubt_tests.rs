@@ -74,7 +74,7 @@ fn the_interval_of_a_commissioned_drive_holds_the_truth_at_every_cutting_power()
 }
 
 #[test]
-#[ignore = "coverage of the cutting power after commissioning, 2 x 2000 repetitions"]
+#[ignore = "1 minute: coverage of the cutting power after commissioning, 2 x 2000 repetitions"]
 fn the_interval_of_a_commissioned_drive_holds_the_truth_2000_times() {
     cover(2000, &[800.0]);
     cover(2000, &[500.0, 800.0, 1200.0]);
