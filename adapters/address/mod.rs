@@ -97,8 +97,44 @@ impl FromStr for Address {
 
     fn from_str(text: &str) -> Result<Self, AddressError> {
         let text = text.trim();
+        if let Some(meant) = guess_scheme(text) {
+            return Err(AddressError { address: text.to_owned(), problems: vec![format!("no scheme; write {meant}")] });
+        }
         let target = parse(text, no_scheme, target::parse)?;
         Ok(Self { text: text.to_owned(), target })
+    }
+}
+
+/// Ports of devices, with the scheme that they speak.
+const PORTS: [(u16, &str); 4] = [(8193, "fanuc"), (10001, "hncnet"), (502, "modbus-tcp"), (1883, "nclink")];
+
+/// A host with or without a port, as on the network page of a control: the address that is meant. `None` for what has a scheme.
+fn guess_scheme(text: &str) -> Option<String> {
+    let (host, port) = match text.rsplit_once(':') {
+        Some((host, port)) => (host, Some(port.parse::<u16>().ok()?)),
+        None => (text, None),
+    };
+    let is_name = host.contains('.') && host.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '.' | '-'));
+    let is_address = host.parse::<std::net::IpAddr>().is_ok() || host.starts_with('[') && host.ends_with(']');
+    // A name without a port may be that of a file.
+    if !(is_address || is_name && port.is_some()) {
+        return None;
+    }
+    let scheme = |port: u16| PORTS.iter().find(|(known, _)| *known == port).map(|(_, scheme)| *scheme);
+    let end = |scheme: &str| match scheme {
+        "modbus-tcp" => "?profile=sdm630",
+        "nclink" => "/SERIAL",
+        "hncnet" => "?library=/path/libhncnet.so",
+        _ => "",
+    };
+    match port.map(|port| (port, scheme(port))) {
+        Some((port, Some(scheme))) => Some(format!("{scheme}://{host}:{port}{}", end(scheme))),
+        Some((port, None)) => Some(format!(
+            "its kind before it, for example fanuc://{host}:{port} or modbus-tcp://{host}:{port}?profile=sdm630"
+        )),
+        None => Some(format!(
+            "its kind before it, for example fanuc://{host}:8193 or modbus-tcp://{host}:502?profile=sdm630"
+        )),
     }
 }
 
@@ -177,6 +213,16 @@ mod tests {
         assert!(refused("simulated://lathe?sede=1").contains("seed"), "{}", refused("simulated://lathe?sede=1"));
         assert!(refused("simulated://lath").contains("lathe"), "{}", refused("simulated://lath"));
         assert!(refused("recording.csv").contains("replay:recording.csv"));
+        for (text, meant) in [
+            ("192.168.1.10:8193", "write fanuc://192.168.1.10:8193"),
+            ("cnc.shop:8193", "write fanuc://cnc.shop:8193"),
+            ("[::1]:8193", "write fanuc://[::1]:8193"),
+            ("192.168.1.20:502", "write modbus-tcp://192.168.1.20:502?profile=sdm630"),
+            ("192.168.1.10", "fanuc://192.168.1.10:8193"),
+            ("192.168.1.10:7000", "fanuc://192.168.1.10:7000"),
+        ] {
+            assert!(refused(text).contains(meant), "{text}: {}", refused(text));
+        }
     }
 
     #[test]

@@ -1,13 +1,16 @@
 //! `cnc-gateway doctor ADDRESS`: who is there, what it answers, how long that takes, what is wrong and what to do next.
 
+use super::lang::language;
 use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
 use crate::config;
 use crate::doctor::{self, DoctorReport, SystemFiles};
 use crate::sinks::{self, SinkAddress};
 use adapters::Address;
 use adapters::address::AddressError;
+use adapters::channel::Channel;
 use adapters::driver::FactValue;
 use clap::Args;
+use rules::physics::explain::Language;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -76,7 +79,8 @@ fn examine_box(arguments: &DoctorArguments) -> CommandOutcome {
     if arguments.json {
         print_json(&report.to_json());
     } else {
-        let mut text = String::from("this computer\n");
+        let words = ReportWords(language());
+        let mut text = format!("{}\n", words.select("this computer", "本机"));
         for fact in &report.facts {
             let value = match &fact.value {
                 FactValue::Number(number) => number.to_string(),
@@ -86,7 +90,7 @@ fn examine_box(arguments: &DoctorArguments) -> CommandOutcome {
             let _ = writeln!(text, "  {}: {value}", fact.name);
         }
         for problem in &report.problems {
-            let _ = writeln!(text, "  problem: {}\n    next: {}", problem.what, problem.next);
+            let _ = writeln!(text, "{}", words.format_problem(&problem.what, &problem.next));
         }
         print_text(&text);
     }
@@ -126,11 +130,21 @@ fn to_outcome(well: bool) -> CommandOutcome {
 
 /// What the device offers, what nobody takes at the end.
 fn write_offers(report: &DoctorReport, line: &mut impl FnMut(std::fmt::Arguments<'_>)) {
+    let words = ReportWords(language());
     let Some(offers) = &report.offers else { return };
     if offers.is_empty() {
-        return line(format_args!("  a device of this kind does not tell what else it offers"));
+        return line(format_args!(
+            "  {}",
+            words.select("a device of this kind does not tell what else it offers", "此类设备不报告其它可读数据")
+        ));
     }
-    line(format_args!("  offers (the name behind `read =` makes a channel of what nobody takes):"));
+    line(format_args!(
+        "  {}",
+        words.select(
+            "offers (the name behind `read =` makes a channel of what nobody takes):",
+            "可读数据（未被使用的，可用 `read =` 后的名称建立通道）："
+        )
+    ));
     let (taken, free): (Vec<_>, Vec<_>) = offers.iter().partition(|offer| offer.channel.is_some());
     for offer in taken.into_iter().chain(free) {
         let says = match &offer.says {
@@ -142,29 +156,63 @@ fn write_offers(report: &DoctorReport, line: &mut impl FnMut(std::fmt::Arguments
     }
 }
 
+/// The words of the report, in the language of the command. What a device or a driver says stands as it was said.
+#[derive(Clone, Copy)]
+struct ReportWords(Language);
+
+impl ReportWords {
+    fn select(self, en: &'static str, zh: &'static str) -> &'static str {
+        self.0.select_text(en, zh)
+    }
+
+    fn format_problem(self, what: &str, next: &str) -> String {
+        let (problem, step) = (self.select("problem", "问题"), self.select("next", "处理"));
+        format!("  {problem}: {what}\n    {step}: {next}")
+    }
+
+    /// In Chinese beside its meaning: the name is what the configuration knows.
+    fn name_channel(self, channel: &'static Channel) -> String {
+        self.0.select_text(channel.name.to_owned(), format!("{} {}", channel.name, channel.zh))
+    }
+}
+
 fn format_report(report: &DoctorReport) -> String {
+    let words = ReportWords(language());
     let mut text = format!("{}\n", report.address);
     let mut line = |what: std::fmt::Arguments<'_>| {
         // Writing to a string does not fail.
         let _ = writeln!(text, "{what}");
     };
-    line(format_args!("  {}", if report.reachable { "answers" } else { "does not answer" }));
+    let answer = if report.reachable {
+        words.select("answers", "有应答")
+    } else {
+        words.select("does not answer", "无应答")
+    };
+    line(format_args!("  {answer}"));
     for fact in &report.identity {
         match &fact.value {
             FactValue::Number(number) => line(format_args!("  {}: {number}", fact.name)),
             FactValue::Text(text) => line(format_args!("  {}: {text}", fact.name)),
         }
     }
-    line(format_args!("  opened and read in {:.1} ms, read again in {:.1} ms", report.open_ms, report.read_ms));
+    let (open_ms, read_ms) = (report.open_ms, report.read_ms);
+    line(format_args!(
+        "{}",
+        words.0.select_text(
+            format!("  opened and read in {open_ms:.1} ms, read again in {read_ms:.1} ms"),
+            format!("  打开并读取用时 {open_ms:.1} ms，再次读取 {read_ms:.1} ms"),
+        )
+    ));
     for (channel, value) in &report.readings {
+        let name = words.name_channel(channel.channel());
         match value {
-            Ok(value) => line(format_args!("    {:<26} {value}", channel.name())),
-            Err(missing) => line(format_args!("    {:<26} - ({missing})", channel.name())),
+            Ok(value) => line(format_args!("    {name:<26} {value}")),
+            Err(missing) => line(format_args!("    {name:<26} - ({missing})")),
         }
     }
     write_offers(report, &mut line);
     for problem in &report.problems {
-        line(format_args!("  problem: {}\n    next: {}", problem.what, problem.next));
+        line(format_args!("{}", words.format_problem(&problem.what, &problem.next)));
     }
     text
 }

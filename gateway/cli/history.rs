@@ -1,5 +1,6 @@
 //! `cnc-gateway history`: what the box remembers.
 
+use super::installation::load_configuration;
 use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
 use crate::history::{DAY_NS, HistoryError, Query, Reader, SqlValue, day_of, plain_cell};
 use crate::records::{RecordKind, RecordQuery, build_document, read_records};
@@ -17,9 +18,9 @@ pub(super) struct HistoryArguments {
     /// History database; without it that of the data directory.
     #[arg(long, global = true, value_name = "DB", conflicts_with = "data_dir")]
     history: Option<PathBuf>,
-    /// Data directory of the gateway.
-    #[arg(long, global = true, value_name = "DIR", default_value = "cnc-gateway-data")]
-    data_dir: PathBuf,
+    /// Data directory of the gateway; without it that of the configuration.
+    #[arg(long, global = true, value_name = "DIR")]
+    data_dir: Option<PathBuf>,
     #[command(subcommand)]
     question: Question,
 }
@@ -155,7 +156,12 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn run(arguments: HistoryArguments) -> CommandResult {
-    let path = &arguments.history.unwrap_or_else(|| arguments.data_dir.join("history.db"));
+    let of_directory = arguments.data_dir.map(|directory| directory.join("history.db"));
+    let path = &match arguments.history.or(of_directory) {
+        Some(path) => path,
+        // As every other command: the installed box, else the built-in configuration.
+        None => load_configuration(None)?.history.path,
+    };
     let open = || Reader::open(path).map_err(|error| to_cannot_run(&error));
     let reader = match arguments.question {
         Question::Repair(repair) => return super::history_upkeep::repair_history(&repair, path),

@@ -35,6 +35,11 @@ pub(super) fn language() -> Language {
     CHOSEN.get().copied().unwrap_or(Language::En)
 }
 
+/// Does the command line of this process say a language?
+pub(super) fn was_asked() -> bool {
+    asked_in(std::env::args_os()).is_some()
+}
+
 /// What the computer is set to; the first of the variables that says anything decides, as in every program.
 pub(super) fn of_computer() -> Language {
     let said = ["LC_ALL", "LC_MESSAGES", "LANG"]

@@ -10,6 +10,8 @@ use clap::Args;
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
+/// Configuration of a box that the service manager starts.
+const CONFIGURATION: &str = "/etc/cnc-gateway/cnc-gateway.toml";
 /// Data directory of a box that the service manager starts.
 const DATA_DIR: &str = "/var/lib/cnc-gateway";
 
@@ -17,7 +19,7 @@ const DATA_DIR: &str = "/var/lib/cnc-gateway";
 #[derive(Debug, Args)]
 pub(super) struct SetupArguments {
     /// The configuration to write.
-    #[arg(long, value_name = "FILE", default_value = "/etc/cnc-gateway/cnc-gateway.toml")]
+    #[arg(long, value_name = "FILE", default_value = CONFIGURATION)]
     out: PathBuf,
     /// Directory of the data of the box.
     #[arg(long, value_name = "DIR", default_value = DATA_DIR)]
@@ -90,10 +92,8 @@ impl Dialogue {
 
 pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
     let asks = !arguments.yes;
-    let zh = lang::language() == Language::Zh;
-    let dialogue = Dialogue { zh, asks };
-    // Otherwise the page opens in the language of the browser.
-    let language = zh.then_some(Language::Zh);
+    let mut dialogue = Dialogue { zh: lang::language() == Language::Zh, asks };
+    let language = choose_language(&mut dialogue)?;
     let machine = match &arguments.name {
         Some(name) => name.clone(),
         None => dialogue.ask_question(("Name of the machine", "机床名称"), &host_name())?,
@@ -116,8 +116,10 @@ pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
         return Err(CannotRun::new("a box needs a control or a meter", next));
     }
     note_data_dir(&arguments.data_dir);
-    // What is started with this file must find the persons that are made here.
-    let data_dir = Some(arguments.data_dir.clone()).filter(|directory| directory.as_os_str() != DATA_DIR);
+    // What is started with this file must find the persons that are made here. Only the service of the package knows its directory by
+    // itself, and only for its own configuration.
+    let of_service = arguments.out.as_os_str() == CONFIGURATION && arguments.data_dir.as_os_str() == DATA_DIR;
+    let data_dir = Some(&arguments.data_dir).filter(|_| !of_service);
     let data_dir = data_dir.map(std::path::absolute).transpose().map_err(CannotRun::from_error)?;
     let answers = SetupAnswers { machine, language, data_dir, control, meters, page_from_network };
     write_configuration(&dialogue, arguments, &answers)?;
@@ -127,6 +129,29 @@ pub(super) fn run(arguments: &SetupArguments) -> CommandResult {
         "下一步:systemctl restart cnc-gateway,然后打开页面。以后都可以在页面或文件中修改。",
     ));
     Ok(CommandOutcome::Fine)
+}
+
+/// Asks in which language the questions and the page are, unless the command line says it. `None`: the page opens in the language of the
+/// browser.
+fn choose_language(dialogue: &mut Dialogue) -> Result<Option<Language>, CannotRun> {
+    if lang::was_asked() || !dialogue.asks {
+        return Ok(dialogue.zh.then_some(Language::Zh));
+    }
+    let default = if dialogue.zh { "zh" } else { "en" };
+    let question = ("Language 语言: en, zh", "语言 Language: zh, en");
+    loop {
+        match dialogue.ask_question(question, default)?.to_lowercase().as_str() {
+            "en" | "english" => {
+                dialogue.zh = false;
+                return Ok(Some(Language::En));
+            }
+            "zh" | "中文" | "chinese" => {
+                dialogue.zh = true;
+                return Ok(Some(Language::Zh));
+            }
+            other => print_text(&format!("  {other}: en, zh\n")),
+        }
+    }
 }
 
 fn host_name() -> String {

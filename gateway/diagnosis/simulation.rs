@@ -3,10 +3,13 @@
 use recording::Recording;
 use rules::twin::Model;
 use rules::twin::diagnosis::find_output_unit;
-use rules::twin::simulate::{SimulatedRows, simulate_recording};
+use rules::twin::simulate::{FormDoubt, SimulatedRows, simulate_recording};
 use rules::twin::text_report::format_short_number;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
+
+/// Half of a 95 % interval, in standard deviations.
+const HALF_INTERVAL: f64 = 1.96;
 
 /// What a model says about a recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +20,8 @@ pub struct Simulation {
     total: Vec<Option<f64>>,
     /// Label and contribution of each part.
     parts: Vec<(String, Vec<f64>)>,
+    /// Where the law of a no-load table is doubted most.
+    form_doubts: Vec<(String, FormDoubt)>,
     recorded: Vec<Option<f64>>,
 }
 
@@ -25,8 +30,8 @@ pub struct Simulation {
 /// # Errors
 /// Everything the model needs and the recording lacks.
 pub fn run(recording: &Recording, model: &Model, blind: bool) -> Result<Simulation, Vec<String>> {
-    let SimulatedRows { total, parts, recorded } = simulate_recording(recording, model, blind)?;
-    Ok(Simulation { output: model.output.clone(), name: model.name.clone(), total, parts, recorded })
+    let SimulatedRows { total, parts, form_doubts, recorded } = simulate_recording(recording, model, blind)?;
+    Ok(Simulation { output: model.output.clone(), name: model.name.clone(), total, parts, form_doubts, recorded })
 }
 
 impl Simulation {
@@ -70,6 +75,14 @@ impl Simulation {
                 format_short_number(high)
             );
         }
+        for (label, doubt) in &self.form_doubts {
+            let (power, half) = (format_short_number(doubt.power), format_short_number(HALF_INTERVAL * doubt.sd));
+            let _ = writeln!(
+                text,
+                "  {label}: between known speeds it is in doubt, at {:.0} rpm {power} +- {half} {unit}; idle there to know it",
+                doubt.speed_rpm
+            );
+        }
         match self.rmse() {
             Some((rmse, rows)) => {
                 let _ =
@@ -84,6 +97,10 @@ impl Simulation {
     #[must_use]
     pub fn to_json(&self) -> Value {
         let part = |(label, mean, low, high): (&str, f64, f64, f64)| json!({ "effect": label, "mean": mean, "min": low, "max": high });
+        let doubt = |(label, it): &(String, FormDoubt)| {
+            let half = HALF_INTERVAL * it.sd;
+            json!({ "effect": label, "speed_rpm": it.speed_rpm, "power": it.power, "uncertainty": half })
+        };
         json!({
             "schema": "simulation/1",
             "model": self.name,
@@ -91,6 +108,7 @@ impl Simulation {
             "unit": find_output_unit(&self.output),
             "rows": self.total.len(),
             "simulated_rows": self.total.iter().flatten().count(),
+            "form_doubts": self.form_doubts.iter().map(doubt).collect::<Vec<_>>(),
             "parts": self.part_summaries().map(part).collect::<Vec<_>>(),
             "rmse": self.rmse().map(|(rmse, _)| rmse),
             "compared_rows": self.rmse().map_or(0, |(_, rows)| rows),

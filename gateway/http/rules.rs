@@ -32,6 +32,7 @@ pub(super) const ROUTES: &[Route] = &[
     Route::put(Role::Setter, "/api/v1/rules/{file}/draft", BODY_MAX, || put(save_draft)),
     Route::delete(Role::Setter, "/api/v1/rules/{file}/draft", 1024, || delete(discard_draft)),
     Route::post(Role::Setter, "/api/v1/rules/{file}/activate", BODY_MAX, || post(activate_rule)),
+    Route::delete(Role::Setter, "/api/v1/rules/{file}", 1024, || delete(remove_rule)),
 ];
 
 /// A text that somebody has typed, and the digest of the text that he began from.
@@ -271,6 +272,40 @@ async fn activate_rule(
         drafts.remove_draft(&name).map_err(describe_store_error)?;
         let was = before.map_or("nothing".to_owned(), |text| digest_of(&text));
         let words = format!("{name}: version {digest} in the place of {was}");
+        Ok(with_audit_note(Json(json!({ "done": true, "version": digest })), words))
+    })
+    .await
+}
+
+/// `DELETE /api/v1/rules/{file}`: takes a script out of charge. Its text stays as a draft, so that it can be put back or discarded. Where
+/// the others do not pass their trials without it, it stays in charge, and the answer (409) says why.
+async fn remove_rule(
+    State(shared): State<ServerState>,
+    Path(name): Path<String>,
+    SignedIn(person): SignedIn,
+) -> Result<Response, ApiProblem> {
+    check_name(&name)?;
+    run_blocking(move || {
+        let drafts = Drafts::from_data_dir(&shared.data_dir);
+        let files = on_disk(&shared)?;
+        let Some(before) = files.iter().find(|file| file.name == name).cloned() else {
+            return Err(ApiProblem::not_found(&format!("a script {name} in charge")));
+        };
+        let others: Vec<ScriptFile> = files.into_iter().filter(|file| file.name != name).collect();
+        if let Err(found) = script::prepare_with(&others, &read_values(&shared)) {
+            let what = found.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+            let hint = "the others need it: change them first";
+            return Err(ApiProblem::conflict(format!("{name} stays in charge: {what}"), hint));
+        }
+        let (at_ms, by) = (now_ms(&shared), person.name);
+        if drafts.read_draft(&name).is_none() {
+            let draft = Draft { text: before.text.clone(), by: by.clone(), at_ms };
+            drafts.save_draft(&name, &draft).map_err(describe_store_error)?;
+        }
+        let digest = digest_of(&before.text);
+        drafts.keep_version(&name, Version { text: before.text, by, at_ms }).map_err(describe_store_error)?;
+        std::fs::remove_file(shared.scripts.join(&name)).map_err(describe_store_error)?;
+        let words = format!("{name}: version {digest} is out of charge");
         Ok(with_audit_note(Json(json!({ "done": true, "version": digest })), words))
     })
     .await

@@ -61,8 +61,11 @@ pub struct ToolUse {
     pub cutting_s: f64,
     /// Mean cutting power over the time in which it was known, W.
     pub cutting_power_w: Option<f64>,
-    /// Mean limit of the wear model for these cuts, W.
+    /// Mean limit of the wear model, W, over the time in which there was one.
     pub limit_w: Option<f64>,
+    /// Mean cutting power over that same time, W: what the limit is compared with. Other cuts of the part have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub power_at_limit_w: Option<f64>,
     /// Mean flank wear that the power means, mm.
     pub wear_mm: Option<f64>,
     /// Mean half width of its 95 % interval, mm.
@@ -103,6 +106,7 @@ struct Tool {
     cutting_s: f64,
     power: Mean,
     limit: Mean,
+    power_at_limit: Mean,
     wear: Mean,
     wear_uncertainty: Mean,
 }
@@ -181,8 +185,11 @@ impl Gathering {
         let Some(tool) = index.and_then(|index| self.tools.get_mut(index)) else { return };
         tool.cutting_s += step_s;
         let wear = estimates.tool_wear_mm.ok();
-        tool.power.add(estimates.cutting_power_w.ok().map(|it| it.value), step_s);
-        tool.limit.add(estimates.wear_limit_w.ok().map(|it| it.value), step_s);
+        let power_w = estimates.cutting_power_w.ok().map(|it| it.value);
+        let at_limit = estimates.wear_limit_w.ok().zip(power_w);
+        tool.power.add(power_w, step_s);
+        tool.limit.add(at_limit.map(|(limit, _)| limit.value), step_s);
+        tool.power_at_limit.add(at_limit.map(|(_, power_w)| power_w), step_s);
         tool.wear.add(wear.map(|it| it.value), step_s);
         tool.wear_uncertainty.add(wear.map(|it| 1.96 * it.sd), step_s);
     }
@@ -212,6 +219,7 @@ impl ToolUse {
             cutting_s: round_value(tool.cutting_s, 1.0),
             cutting_power_w: tool.power.value().map(|watts| round_value(watts, 1.0)),
             limit_w: tool.limit.value().map(|watts| round_value(watts, 1.0)),
+            power_at_limit_w: tool.power_at_limit.value().map(|watts| round_value(watts, 1.0)),
             wear_mm: tool.wear.value().map(|mm| round_value(mm, 4.0)),
             wear_uncertainty_mm: tool.wear_uncertainty.value().map(|mm| round_value(mm, 4.0)),
         }
@@ -271,6 +279,21 @@ mod tests {
         assert_eq!(tools, [("T1", 3.0, Some(1200.0)), ("T2", 1.0, Some(400.0))]);
         assert_eq!(detail.tools[0].limit_w, None);
         assert_eq!(gathering.finish_part(), PartDetail::default());
+    }
+
+    /// A roughing cut outside of the model, of 3,000 W, and a finishing cut of 200 W whose limit is 252 W: no power of the one beside the
+    /// limit of the other.
+    #[test]
+    fn the_limit_stands_beside_the_power_of_the_same_cuts() {
+        let mut gathering = Gathering::default();
+        gathering.add_step(&cutting(3000.0), ("T1", ""), None, 6.0);
+        let limit = Ok(Estimate { value: 252.0, sd: 5.0 });
+        gathering.add_step(&Estimates { wear_limit_w: limit, ..cutting(200.0) }, ("T1", ""), None, 2.0);
+        let tool = gathering.finish_part().tools.remove(0);
+        assert_eq!(
+            (tool.limit_w, tool.power_at_limit_w, tool.cutting_power_w),
+            (Some(252.0), Some(200.0), Some(2300.0))
+        );
     }
 
     #[test]

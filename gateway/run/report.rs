@@ -102,6 +102,7 @@ pub fn build_state_status(pipeline: &Pipeline) -> StateStatus {
         basis_text: estimates.basis.to_string(),
         visibility: estimates.visibility.as_word(),
         no_load_origin: estimates.no_load_origin.as_word(),
+        load_loss_origin: estimates.load_loss_origin.as_word(),
     }
 }
 

@@ -279,6 +279,7 @@ impl Ticker {
             scripts: report::list_scripts(&self.pipeline),
             operations: self.operations.as_ref().map(Operations::status),
             wear: wear::build_status(&self.pipeline),
+            no_wear_model: self.pipeline.wear().explain_missing_model(),
             sinks: self.sinks.list_sinks(),
             problems: self.list_problems(&history),
             history,

@@ -84,6 +84,8 @@ pub struct StateStatus {
     pub visibility: &'static str,
     /// Where the no-load power comes from.
     pub no_load_origin: &'static str,
+    /// `commissioned`, or `not_commissioned`: then the uncertainty of the cutting power is that of drives of this kind.
+    pub load_loss_origin: &'static str,
 }
 
 /// An alarm that stands.
@@ -391,6 +393,9 @@ pub struct Status {
     /// Wear of the tool, where the library has a model for the cut.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wear: Option<WearStatus>,
+    /// Why the library has none for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub no_wear_model: Option<String>,
     /// How the history is doing.
     pub history: HistoryStatus,
     /// What leaves the box, where a sink is configured.

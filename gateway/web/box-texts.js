@@ -2,6 +2,14 @@
 // phrases stand before their parts. A test asks the box for all its reasons and finds each of them here.
 export const PHRASES = [
   ["the gate is not armed: recorded, not written", "闸门未允许写入：仅记录，不写入"],
+  ["the library has no wear model", "模型库中没有磨损模型"],
+  ["the wear model is for work material ", "磨损模型适用于工件材料 "],
+  ["the wear model is for machine ", "磨损模型适用于机床 "],
+  ["the wear model is for tool ", "磨损模型适用于刀具 "],
+  ["the wear model is for operation ", "磨损模型适用于工序 "],
+  [", and that of this cut is not known", "，本次切削的未知"],
+  [", and this cut is of ", "，本次切削为 "],
+  ["no part with this edge yet", "该刀刃尚无完成的工件"],
   ["nothing is asked for any more", "不再请求"],
   ["the programmed feed, 100 %", "按编程进给，100 %"],
   ["as asked for", "按请求执行"],

@@ -66,11 +66,16 @@ impl LoadLossLaw {
         Self { linear, quadratic_per_w, speed_rpm: None }
     }
 
+    /// a1 at a spindle speed in rpm of either sign, over a1 as stated.
+    pub(super) fn speed_factor(&self, speed_rpm: f64) -> f64 {
+        let share = |learned: f64| (learned / speed_rpm.abs().max(Self::SLOWEST * learned)).powi(2);
+        self.speed_rpm.map_or(1.0, share)
+    }
+
     /// a1 at a spindle speed in rpm of either sign, 1/W.
     #[must_use]
     pub fn quadratic_at(&self, speed_rpm: f64) -> f64 {
-        let share = |learned: f64| (learned / speed_rpm.abs().max(Self::SLOWEST * learned)).powi(2);
-        self.quadratic_per_w * self.speed_rpm.map_or(1.0, share)
+        self.quadratic_per_w * self.speed_factor(speed_rpm)
     }
 
     /// Splits the power above no-load power at a spindle speed; see [`solve_power_balance`].

@@ -21,7 +21,8 @@
 //! already under load when the gateway starts settles only against a table; otherwise cutting is not claimed.
 
 use super::basis::StateBasis;
-use super::estimate::{NoEstimate, NoLoadOrigin};
+use super::estimate::NoEstimate;
+use super::estimate_words::NoLoadOrigin;
 use super::evidence::Evidence;
 use super::signals::{Feed, Pace, seconds_between};
 use super::situation::{Situation, Tick};

@@ -1,12 +1,12 @@
 //! What one tick yields: every quantity with its uncertainty, or the reason why there is none.
 
 use super::basis::StateBasis;
+use super::estimate_words::{LoadLossOrigin, NoLoadOrigin, Visibility};
 use super::loads::{Figure, Loads};
 use super::part::PartFigures;
 use super::state::State;
 use adapter_core::clock::TimeNs;
 use adapter_core::{Absence, ChannelId};
-use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A value and one standard deviation, both in the unit that the quantity's name ends in, both finite.
@@ -200,70 +200,6 @@ impl fmt::Display for NoEstimate {
     }
 }
 
-/// Where the no-load power in force comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum NoLoadOrigin {
-    /// There is no no-load power at this tick.
-    None,
-    /// Measured, or configured, at this very speed.
-    Measured,
-    /// Quadratic, or with two speeds linear, interpolation between neighbouring speeds.
-    Interpolated,
-    /// The same beyond the slowest or fastest known speed; see the noise gain.
-    Extrapolated,
-    /// Not learned: the level right after a spindle start with the axes already moving. A spindle starts in the air,
-    /// but this is only an upper bound, so cutting power is a lower one.
-    UpperBound,
-}
-
-impl NoLoadOrigin {
-    /// Every origin, for tables of words.
-    pub const ALL: [Self; 5] = [Self::None, Self::Measured, Self::Interpolated, Self::Extrapolated, Self::UpperBound];
-
-    /// The word used in SQL, scripts, JSON and CSV.
-    #[must_use]
-    pub fn as_word(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Measured => "measured",
-            Self::Interpolated => "interpolated",
-            Self::Extrapolated => "extrapolated",
-            Self::UpperBound => "upper_bound",
-        }
-    }
-}
-
-/// Can cutting be seen in the spindle power at this moment?
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Visibility {
-    /// Nothing could be cutting: no feed, rapid traverse, or the spindle is not steady.
-    NotAsked,
-    /// Feed is on and the power stands out: cutting is seen.
-    Visible,
-    /// Feed is on and the power does not stand out: either no cut, or one below the least visible cutting power.
-    BelowVisibility,
-    /// Feed is on and there is no no-load power to compare with.
-    NoReference,
-}
-
-impl Visibility {
-    /// Every answer, for tables of words.
-    pub const ALL: [Self; 4] = [Self::NotAsked, Self::Visible, Self::BelowVisibility, Self::NoReference];
-
-    /// The word used in SQL, scripts, JSON and CSV.
-    #[must_use]
-    pub fn as_word(self) -> &'static str {
-        match self {
-            Self::NotAsked => "not_asked",
-            Self::Visible => "visible",
-            Self::BelowVisibility => "below_visibility",
-            Self::NoReference => "no_reference",
-        }
-    }
-}
-
 /// Everything inferred at one tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimates {
@@ -287,6 +223,10 @@ pub struct Estimates {
     pub cutting_power_w: Estimated,
     /// Additional loss that exists only under load, W.
     pub load_loss_w: Estimated,
+    /// What of the standard deviation of the cutting power all cuts on this drive have in common, W: the doubt of its load loss.
+    pub cutting_power_common_sd_w: f64,
+    /// Was the load loss measured on this drive?
+    pub load_loss_origin: LoadLossOrigin,
     /// Least cutting power that stands out of no-load power and noise, W.
     pub visible_cutting_power_w: Estimated,
     /// Cutting power `[Pc]` at which the edge in use would be worn in this cut, W; from the library of wear models.
@@ -334,6 +274,8 @@ impl Estimates {
             no_load_power_w: Err(NoEstimate::NotYet),
             cutting_power_w: Err(NoEstimate::NotYet),
             load_loss_w: Err(NoEstimate::NotYet),
+            cutting_power_common_sd_w: 0.0,
+            load_loss_origin: LoadLossOrigin::NotCommissioned,
             visible_cutting_power_w: Err(NoEstimate::NotYet),
             wear_limit_w: Err(NoEstimate::NoModel),
             tool_wear_mm: Err(NoEstimate::NoPartYet),
@@ -367,6 +309,15 @@ impl Estimates {
             ("tool_parts_left", self.tool_parts_left),
             ("material_level_pct", self.material_level_pct),
         ]
+    }
+
+    /// The cutting power with the deviation that matters where cuts on this drive are compared with each other.
+    ///
+    /// # Errors
+    /// As of the cutting power.
+    pub fn comparable_cutting_power(&self) -> Estimated {
+        let common_w = self.cutting_power_common_sd_w;
+        self.cutting_power_w.map(|it| Estimate { sd: (it.sd * it.sd - common_w * common_w).max(0.0).sqrt(), ..it })
     }
 
     /// The figure of this name, to be set: of the load, and of the part that was finished last.

@@ -9,7 +9,7 @@
 //! Under feed nothing is learned, except that no-load power cannot be above what is measured (see `bound`).
 
 use super::bound::{self, Normal};
-use super::estimate::NoLoadOrigin;
+use super::estimate_words::NoLoadOrigin;
 use super::no_load::{NoLoad, NoLoadPoint};
 use super::noise::RelativeVariances;
 use super::settings::Settings;

@@ -5,8 +5,8 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `settings`, `place_settings` | the one table of tolerances and lengths, and values for one tool or operation |
-//! | `state`, `estimate` | the words and numbers that come out |
+//! | `settings`, `stage_settings`, `place_settings` | the one table of tolerances and lengths, and values for one gear stage, tool or operation |
+//! | `state`, `estimate`, `estimate_words` | the words and numbers that come out |
 //! | `filter` | anti-pulse moving average |
 //! | `basis` | what stands for spindle power where nobody measures it |
 //! | `inputs`, `signals`, `noise` | what is needed of a sample, its recent past, how noisy it is |
@@ -18,7 +18,7 @@
 //! | `visibility` | over a whole recording: could cutting be seen at all |
 //! | `part` | what is known of the part that was finished last |
 //! | `loads` | the load beside its target and beside what was learned, and the feed override between them |
-//! | `cutting` | power balance: cutting power and load loss |
+//! | `cutting`, `load_loss_doubt` | power balance: cutting power and load loss, and how well the load loss is known |
 //! | `power_separation` | no-load power and load loss from recordings |
 //! | `alignment` | lag, drift and averaging window between controller and meter |
 //! | `thermal` | thermal error from temperatures: sensors, laws, compensation, pulse insertion |
@@ -31,12 +31,14 @@ mod bound;
 mod cutting;
 mod detector;
 mod estimate;
+mod estimate_words;
 mod evidence;
 mod filter;
 mod inference;
 mod inputs;
 mod interpolation;
 mod learning;
+mod load_loss_doubt;
 pub mod loads;
 mod no_load;
 mod noise;
@@ -49,6 +51,7 @@ mod settings;
 mod signals;
 mod situation;
 pub mod spindle_current;
+mod stage_settings;
 mod state;
 mod supply;
 pub mod thermal;
@@ -61,10 +64,15 @@ pub use evidence::Evidence;
 pub use window::{Means, PowerWindow, is_stationary};
 
 pub use cutting::{Balance, LoadLossLaw, solve_power_balance};
-pub use estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};
+pub use estimate::{Estimate, Estimated, Estimates, NoEstimate};
+pub use estimate_words::{LoadLossOrigin, NoLoadOrigin, Visibility};
 pub use filter::AntiPulse;
 pub use inference::{Inference, RestoreError};
-pub use interpolation::{lagrange_weights, noise_gain, select_adjacent_speeds};
+pub use interpolation::{
+    EXTRAPOLATION_GAIN_MAX, SimulatedSpeedWeights, SpeedWeights, Weights, form_sd, lagrange_weights, noise_gain,
+    select_adjacent_speeds, weigh_known_speeds,
+};
+pub use load_loss_doubt::LoadLossDoubt;
 pub use no_load::{NoLoad, NoLoadPoint, NoLoadTable};
 pub use part::PartFigures;
 pub use script_number::format_script_number;

@@ -6,8 +6,9 @@
 //! What is learned is a joint estimate: no-load power drifts with temperature, mostly alike at every speed, so a
 //! power learned now also corrects those learned earlier (Kalman update with correlated random walks).
 
-use super::estimate::{NoEstimate, NoLoadOrigin};
-use super::interpolation::{Weights, noise_gain};
+use super::estimate::NoEstimate;
+use super::estimate_words::NoLoadOrigin;
+use super::interpolation::{Weights, form_sd, noise_gain};
 use super::settings::{SPEEDS_PER_STAGE, STAGES, Settings};
 use super::signals::seconds_between;
 use adapter_core::clock::TimeNs;
@@ -288,17 +289,14 @@ impl NoLoadTable {
     pub fn get(&self, stage: usize, speed_rpm: f64, now_ns: TimeNs, settings: &Settings) -> Result<NoLoad, NoEstimate> {
         let n = speed_rpm.abs();
         let stage = self.stages.get(stage).ok_or(NoEstimate::NotLearned)?;
-        if let Some(at) = stage.find_speed_near(n, settings.speed_tolerance) {
-            let weights = Weights::from_single_speed(at, n / stage.speeds_rpm[at]);
-            let (power_w, sd_w) =
-                (weights.weigh_powers(&stage.powers_w), stage.variance_w2(&weights, now_ns, settings).sqrt());
-            let supply_log = stage.supply_log(&weights);
-            return Ok(NoLoad { power_w, sd_w, noise_gain: 1.0, origin: NoLoadOrigin::Measured, supply_log });
-        }
-        let (weights, other) = stage.compute_weight_pair(n).ok_or(NoEstimate::NotLearned)?;
+        let (inside, near) = (stage.covers_speed(n), stage.find_speed_near(n, settings.speed_tolerance));
+        // Between known speeds the law holds throughout; just beyond the last of them its power goes with the speed.
+        let beside = near.filter(|_| !inside || stage.len() < 2);
+        let alone = beside.map(|at| [Weights::from_single_speed(at, n / stage.speeds_rpm[at]); 2].into());
+        let pair = alone.or_else(|| stage.compute_weight_pair(n));
+        let (weights, other) = pair.ok_or(NoEstimate::NotLearned)?;
         let noise_gain = noise_gain(&weights.weight);
         let power_w = weights.weigh_powers(&stage.powers_w);
-        let inside = stage.covers_speed(n);
         // The limit itself is allowed, whatever the last digit of the weights.
         if !inside && (noise_gain > settings.noise_gain_limit + 1e-9 || power_w <= 0.0) {
             return Err(NoEstimate::Extrapolated { noise_gain });
@@ -306,10 +304,14 @@ impl NoLoadTable {
         if power_w <= 0.0 {
             return Err(NoEstimate::NotLearned);
         }
-        let form_w = (power_w - other.weigh_powers(&stage.powers_w)) / 3.0_f64.sqrt();
-        let beyond_w = BEYOND_SD * stage.measure_extrapolation(n) * power_w;
+        let form_w = form_sd(power_w, other.weigh_powers(&stage.powers_w));
+        let beyond_w = if near.is_none() { BEYOND_SD * stage.measure_extrapolation(n) * power_w } else { 0.0 };
         let sd_w = (stage.variance_w2(&weights, now_ns, settings) + form_w * form_w + beyond_w * beyond_w).sqrt();
-        let origin = if inside { NoLoadOrigin::Interpolated } else { NoLoadOrigin::Extrapolated };
+        let origin = match (near, inside) {
+            (Some(_), _) => NoLoadOrigin::Measured,
+            (None, true) => NoLoadOrigin::Interpolated,
+            (None, false) => NoLoadOrigin::Extrapolated,
+        };
         Ok(NoLoad { power_w, sd_w, noise_gain, origin, supply_log: stage.supply_log(&weights) })
     }
 

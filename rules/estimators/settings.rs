@@ -1,9 +1,9 @@
 //! Every tolerance and length the estimators use: one table that scripts, configuration and documentation read.
 
-use super::cutting::LoadLossLaw;
 use super::loads::LoadCurves;
 use super::no_load::NoLoadPoint;
 use super::place_settings::PlaceValues;
+use super::stage_settings::{OF_STAGE, find_place_of_stage, split_stage_suffix};
 use adapter_core::channel::find_nearest_name;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -30,7 +30,7 @@ pub struct Setting {
     pub whole: bool,
     /// What it does, in English.
     pub en: &'static str,
-    get: fn(&Settings) -> f64,
+    pub(super) get: fn(&Settings) -> f64,
     pub(super) set: fn(&mut Settings, f64),
 }
 
@@ -73,9 +73,7 @@ macro_rules! settings {
         #[serde(deny_unknown_fields)]
         pub struct Settings {
             $(#[doc = $en] pub(super) $name: f64,)*
-            pub(super) stage_load_loss_linear: [Option<f64>; STAGES],
-            pub(super) stage_load_loss_quadratic_per_w: [Option<f64>; STAGES],
-            pub(super) stage_load_loss_speed_rpm: [Option<f64>; STAGES],
+            pub(super) of_stage: [[Option<f64>; STAGES]; OF_STAGE.len()],
             pub(super) no_load_table: Vec<NoLoadPoint>,
             #[serde(skip)]
             pub(super) load_curves: Option<Arc<LoadCurves>>,
@@ -87,9 +85,7 @@ macro_rules! settings {
             fn default() -> Self {
                 Self {
                     $($name: $default,)*
-                    stage_load_loss_linear: [None; STAGES],
-                    stage_load_loss_quadratic_per_w: [None; STAGES],
-                    stage_load_loss_speed_rpm: [None; STAGES],
+                    of_stage: [[None; STAGES]; OF_STAGE.len()],
                     no_load_table: Vec::new(),
                     load_curves: None,
                     places: Vec::new(),
@@ -166,8 +162,14 @@ settings! {
     "a1: growth of the load loss coefficient per watt of cutting power, for gear stages without a value of their own"
     load_loss_speed_rpm "rpm" 0.0 100000.0 0.0 false
     "Spindle speed at which a1 is as given, and goes with 1/n^2 elsewhere (copper losses); 0 = a1 is the same at every speed; for gear stages without a value of their own"
-    load_loss_sd "1" 0.0 0.5 0.05 false
-    "Uncertainty of a0, one standard deviation"
+    load_loss_sd "1" 0.0 0.5 0.0 false
+    "How well the load loss over cutting power is known at load_loss_sd_at_w, one standard deviation, from commissioning; 0 = not commissioned, then that of drives of this kind (0.12)"
+    load_loss_sd_at_w "W" 0.0 100000.0 0.0 false
+    "Cutting power at which load_loss_sd holds: there the share that is lost does not depend on a1"
+    load_loss_quadratic_sd_per_w "1/W" 0.0 0.01 0.0 false
+    "How well a1 is known, one standard deviation, from commissioning"
+    load_loss_only_speed_rpm "rpm" 0.0 100000.0 0.0 false
+    "Spindle speed of the cuts where all were made at one: at other speeds a1 is doubted; 0 = cuts at several speeds"
     constant_load_target_w "W" 0.0 50000.0 0.0 false
     "Constant load: power to aim at, cutting power or with curves the power they are of; 0 = the spindle load is aimed at"
     constant_load_target_a "A" 0.0 500.0 0.0 false
@@ -209,15 +211,13 @@ impl Settings {
     #[must_use]
     pub fn get(&self, name: &str) -> Option<f64> {
         match split_stage_suffix(name) {
-            Some(("load_loss_linear", stage)) => Some(self.load_loss(stage).linear),
-            Some(("load_loss_quadratic_per_w", stage)) => Some(self.load_loss(stage).quadratic_per_w),
-            Some(("load_loss_speed_rpm", stage)) => Some(self.load_loss(stage).speed_rpm.unwrap_or(0.0)),
-            _ => find_setting(name).map(|setting| (setting.get)(self)),
+            Some((base, stage)) => find_place_of_stage(base).and_then(|row| self.value_of_stage(row, stage)),
+            None => find_setting(name).map(|setting| (setting.get)(self)),
         }
     }
 
-    /// Sets a value by name. The names of [`SETTINGS`], and `load_loss_linear_stage_N`,
-    /// `load_loss_quadratic_per_w_stage_N`, `load_loss_speed_rpm_stage_N` for one gear stage.
+    /// Sets a value by name. The names of [`SETTINGS`], and those of the load loss with `_stage_N` for one gear stage, as
+    /// `load_loss_linear_stage_2`.
     ///
     /// # Errors
     /// An unknown name or a value outside the range; the settings are unchanged then.
@@ -227,10 +227,10 @@ impl Settings {
         let setting = find_setting(base).ok_or_else(|| report_unknown_setting(name))?;
         setting.check_value(name, value)?;
         match stage {
-            Some(("load_loss_linear", stage)) => self.stage_load_loss_linear[stage] = Some(value),
-            Some(("load_loss_quadratic_per_w", stage)) => self.stage_load_loss_quadratic_per_w[stage] = Some(value),
-            Some(("load_loss_speed_rpm", stage)) => self.stage_load_loss_speed_rpm[stage] = Some(value),
-            Some(_) => return Err(report_unknown_setting(name)),
+            Some((base, stage)) => {
+                let row = find_place_of_stage(base).ok_or_else(|| report_unknown_setting(name))?;
+                self.of_stage[row][stage] = Some(value);
+            }
             None => (setting.set)(self, value),
         }
         Ok(())
@@ -276,17 +276,6 @@ impl Settings {
         }
         found
     }
-
-    /// The load loss of a gear stage.
-    #[must_use]
-    pub fn load_loss(&self, stage: usize) -> LoadLossLaw {
-        let own = |values: &[Option<f64>; STAGES]| values.get(stage).copied().flatten();
-        LoadLossLaw::from_stated_speed(
-            own(&self.stage_load_loss_linear).unwrap_or(self.load_loss_linear),
-            own(&self.stage_load_loss_quadratic_per_w).unwrap_or(self.load_loss_quadratic_per_w),
-            own(&self.stage_load_loss_speed_rpm).unwrap_or(self.load_loss_speed_rpm),
-        )
-    }
 }
 
 impl Setting {
@@ -301,12 +290,6 @@ impl Setting {
 
 pub(super) fn find_setting(name: &str) -> Option<&'static Setting> {
     SETTINGS.iter().find(|setting| setting.name == name)
-}
-
-/// `load_loss_linear_stage_3` as base name and stage.
-fn split_stage_suffix(name: &str) -> Option<(&str, usize)> {
-    let (base, stage) = name.rsplit_once("_stage_")?;
-    stage.parse().ok().filter(|stage| *stage < STAGES).map(|stage| (base, stage))
 }
 
 pub(super) fn report_unknown_setting(name: &str) -> SettingError {
@@ -340,20 +323,6 @@ mod tests {
         assert!(settings.set_value("c1", f64::NAN).is_err());
         assert!(settings.set_value("c1_stage_2", 0.1).is_err());
         assert_eq!(settings, Settings::default());
-    }
-
-    #[test]
-    fn a_gear_stage_may_have_its_own_load_loss() {
-        let mut settings = Settings::default();
-        settings.set_value("load_loss_linear_stage_2", 0.25).expect("in range");
-        settings.set_value("load_loss_speed_rpm_stage_2", 640.0).expect("in range");
-        settings.set_value("load_loss_speed_rpm", 800.0).expect("in range");
-        settings.set_value("load_loss_speed_rpm_stage_3", 0.0).expect("the same at every speed");
-        let of = |linear: f64, speed_rpm: Option<f64>| LoadLossLaw { linear, quadratic_per_w: 0.0, speed_rpm };
-        assert_eq!(settings.load_loss(2), of(0.25, Some(640.0)));
-        assert_eq!(settings.load_loss(1), of(0.18, Some(800.0)));
-        assert_eq!(settings.load_loss(3), of(0.18, None));
-        assert_eq!(settings.get("load_loss_speed_rpm_stage_2"), Some(640.0));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Over a whole recording or shift: could cutting be seen at all?
 
-use super::estimate::{Estimates, Visibility};
+use super::estimate::Estimates;
+use super::estimate_words::Visibility;
 use super::signals::seconds_between;
 use adapter_core::clock::TimeNs;
 use std::fmt;

@@ -38,6 +38,14 @@ impl fmt::Display for ScriptProblem {
 /// A text that is no script.
 pub(super) fn of_parse(file: &str, error: &ParseError) -> ScriptProblem {
     let (what, next) = match error.err_type() {
+        ParseErrorType::BadInput(rhai::LexError::ImproperSymbol(symbol, _)) if symbol == "=" => {
+            ("`=` sets a variable; here two values are compared".to_owned(), "write `==`".to_owned())
+        }
+        ParseErrorType::BadInput(rhai::LexError::ImproperSymbol(symbol, hint))
+            if !is_word(symbol) && !hint.is_empty() =>
+        {
+            (format!("`{symbol}` is no operator of a script"), hint.clone())
+        }
         ParseErrorType::Reserved(word) | ParseErrorType::BadInput(rhai::LexError::ImproperSymbol(word, _)) => {
             describe_reserved(word)
         }
@@ -59,6 +67,10 @@ pub(super) fn of_parse(file: &str, error: &ParseError) -> ScriptProblem {
         other => (other.to_string(), String::new()),
     };
     ScriptProblem::new(file, error.position(), what, next)
+}
+
+fn is_word(symbol: &str) -> bool {
+    symbol.starts_with(|c: char| c.is_alphabetic() || c == '_')
 }
 
 fn describe_reserved(word: &str) -> (String, String) {
@@ -160,5 +172,25 @@ pub(super) fn describe_type(value: &Dynamic) -> &'static str {
         "map" => "a map",
         "bool" => "true or false",
         _ => "a value of this kind",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{ScriptFile, compile_scripts};
+
+    #[test]
+    fn an_equals_sign_in_a_condition_is_told_as_such() {
+        for (text, part) in [
+            ("if state = \"cutting\" { note(\"x\"); }", "write `==`"),
+            ("let a = 1;\nif a = 2 { note(\"x\"); }", "write `==`"),
+            ("let import = 2;", "each file stands on its own"),
+        ] {
+            let file = ScriptFile { name: "a.rhai".to_owned(), text: text.to_owned() };
+            let told = compile_scripts(&[file]).err().expect("no script");
+            let told: Vec<String> = told.iter().map(ToString::to_string).collect();
+            assert!(told.iter().any(|it| it.contains(part)), "{text}: {told:?}");
+            assert!(!told.iter().any(|it| it.contains("choose another name")), "{told:?}");
+        }
     }
 }

@@ -10,7 +10,7 @@ use adapter_core::words::of_channel;
 use adapter_core::{ChannelId, Sample};
 use estimators::loads::Figure;
 use estimators::wear::tool_of;
-use estimators::{Estimated, Estimates, NoEstimate, NoLoadOrigin, SETTINGS, State, Visibility};
+use estimators::{Estimated, Estimates, LoadLossOrigin, NoEstimate, NoLoadOrigin, SETTINGS, State, Visibility};
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
@@ -143,7 +143,7 @@ const fn define_word(
 const TOOL: &str = "tool";
 
 /// Words that are neither channels nor quantities.
-const OWN: [Word; 9] = [
+const OWN: [Word; 11] = [
     define_word(
         "state",
         "",
@@ -178,6 +178,24 @@ const OWN: [Word; 9] = [
         WordKind::Text,
         ("Where the no-load power comes from", "空载功率的来源"),
         WordSource::Text(|it| it.no_load_origin.as_word()),
+    ),
+    define_word(
+        "load_loss_origin",
+        "",
+        WordKind::Text,
+        ("Was the load loss measured on this drive?", "附加损耗是否已标定"),
+        WordSource::Text(|it| it.load_loss_origin.as_word()),
+    ),
+    define_word(
+        "cutting_power_comparable_sd_w",
+        "W",
+        WordKind::Number,
+        (
+            "One standard deviation of the cutting power where cuts on this drive are compared: without the doubt of its load loss that all of \
+             them have in common",
+            "同一主轴各次切削相互比较时切削功率的标准不确定度",
+        ),
+        WordSource::Deviation(Estimates::comparable_cutting_power),
     ),
     define_word(
         "load_held",
@@ -218,6 +236,8 @@ fn since_s(now_ns: i64, then_ns: i64) -> f64 {
 
 static STATES: LazyLock<Vec<&str>> = LazyLock::new(|| State::ALL.map(State::as_word).to_vec());
 static VISIBILITIES: LazyLock<Vec<&str>> = LazyLock::new(|| Visibility::ALL.map(Visibility::as_word).to_vec());
+static LOAD_LOSS_ORIGINS: LazyLock<Vec<&str>> =
+    LazyLock::new(|| LoadLossOrigin::ALL.map(LoadLossOrigin::as_word).to_vec());
 static ORIGINS: LazyLock<Vec<&str>> = LazyLock::new(|| NoLoadOrigin::ALL.map(NoLoadOrigin::as_word).to_vec());
 
 /// The words that a text of this name can be; empty where it can be any.
@@ -226,6 +246,7 @@ fn one_of(name: &str) -> &'static [&'static str] {
         "state" => &STATES,
         "visibility" => &VISIBILITIES,
         "no_load_origin" => &ORIGINS,
+        "load_loss_origin" => &LOAD_LOSS_ORIGINS,
         _ => of_channel(name).unwrap_or_default(),
     }
 }

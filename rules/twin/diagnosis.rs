@@ -4,6 +4,7 @@ use super::model::Model;
 use super::quality::Fault;
 use super::region::Region;
 use adapter_core::bilingual::Bilingual;
+use physics::explain::Language;
 
 /// The unit of an output, from its name.
 #[must_use]
@@ -40,6 +41,19 @@ impl Verdict {
             Self::NoMismatch => "no_mismatch",
             Self::CannotTell => "cannot_tell",
         }
+    }
+
+    /// The same for a reader of Chinese; in English the word of the contract stands.
+    #[must_use]
+    pub fn describe(self, language: Language) -> &'static str {
+        let zh = match self {
+            Self::Explained => "已解释",
+            Self::Ambiguous => "多种解释",
+            Self::Unexplained => "存在但未能命名",
+            Self::NoMismatch => "无偏差",
+            Self::CannotTell => "无法判断",
+        };
+        language.select_text(self.as_word(), zh)
     }
 }
 

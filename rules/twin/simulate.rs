@@ -3,8 +3,9 @@
 
 use super::bind::bind_model;
 use super::inputs::mark_rows_with_inputs;
-use super::model::{Model, Part, simulate_parts};
+use super::model::{Model, Part, PartFunction, simulate_parts};
 use super::model_file::{parse_model, write_model};
+pub use super::speed_table::FormDoubt;
 use physics::Scene;
 use recording::{Cells, Numbers, Recording};
 
@@ -15,6 +16,8 @@ pub struct SimulatedRows {
     pub total: Vec<Option<f64>>,
     /// Label of each part and what it adds, row by row.
     pub parts: Vec<(String, Vec<f64>)>,
+    /// Where the law of a no-load table is doubted most: label of the part, and the doubt.
+    pub form_doubts: Vec<(String, FormDoubt)>,
     /// The recorded output; `None` where it is absent.
     pub recorded: Vec<Option<f64>>,
 }
@@ -36,6 +39,7 @@ pub fn simulate_recording(recording: &Recording, model: &Model, blind: bool) -> 
         scene.exclude_rows(0..scene.rows());
     }
     let parts = bind_model(model, &scene)?;
+    let form_doubts = list_form_doubts(&parts, &scene);
     let known = mark_rows_with_inputs(&scene, &parts);
     let Some(simulated) = simulate_parts(&parts, &mut scene) else {
         return Err(vec!["the model cannot be simulated over this recording".to_owned()]);
@@ -44,8 +48,18 @@ pub fn simulate_recording(recording: &Recording, model: &Model, blind: bool) -> 
     Ok(SimulatedRows {
         total: simulated.total.into_iter().zip(&known).map(|(x, known)| known.then_some(x)).collect(),
         parts: labels.zip(simulated.contributions).collect(),
+        form_doubts,
         recorded: recorded.unwrap_or_else(|| vec![None; recording.count_rows()]),
     })
+}
+
+fn list_form_doubts(parts: &[Part], scene: &Scene) -> Vec<(String, FormDoubt)> {
+    let of_part = |part: &Part| {
+        let PartFunction::Table(table) = &part.body else { return None };
+        let powers: Vec<f64> = part.parameters.iter().map(|parameter| parameter.value).collect();
+        Some((part.label().to_owned(), table.find_greatest_doubt(scene, &powers)?))
+    };
+    parts.iter().filter_map(of_part).collect()
 }
 
 /// These parts in the place of those of a model, written and read again, over a recording; `None` where the file would be refused.

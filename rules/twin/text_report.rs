@@ -80,7 +80,7 @@ impl Say<'_> {
 
     fn format_headline(&self, diagnosis: &Diagnosis) -> String {
         let summary = self.language.select_text(&diagnosis.summary.en, &diagnosis.summary.zh);
-        format!("{}{}{summary}\n", diagnosis.verdict.as_word(), self.language.select_text(": ", "："))
+        format!("{}{}{summary}\n", diagnosis.verdict.describe(self.language), self.language.select_text(": ", "："))
     }
 
     fn list_regions(&self, diagnosis: &Diagnosis) -> Vec<String> {

@@ -37,7 +37,7 @@ const ELSEWHERE: [(&str, &str); 6] = [
     ("doctor --box", "gateway/sources/doctor/computer.rs: its answer is that of the computer"),
 ];
 /// What a command that runs until it is stopped says when it serves; others name the address of their page.
-const SERVES: [(&str, &str); 2] = [("fanuc", "fanuc://"), ("modbus", "modbus-tcp://")];
+const SERVES: [(&str, &str); 3] = [("fanuc", "fanuc://"), ("modbus", "modbus-tcp://"), ("machine", "modbus-tcp://")];
 
 /// A command of a document.
 struct Step {

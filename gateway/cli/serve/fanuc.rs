@@ -8,7 +8,7 @@ use adapters::fanuc_server::{Server, ServerSettings, SimulatedControl};
 use adapters::simulated::Simulated;
 use adapters::units::OverridePct;
 use clap::{Args, ValueEnum};
-use std::net::TcpListener;
+use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -21,6 +21,13 @@ const LOOK: Duration = Duration::from_millis(50);
 pub(in crate::cli) struct FanucArguments {
     #[command(flatten)]
     common: Common,
+    #[command(flatten)]
+    control: ControlArguments,
+}
+
+/// What the control is like.
+#[derive(Debug, Args)]
+pub(in crate::cli) struct ControlArguments {
     /// Generation of the control, which decides the encodings.
     #[arg(long, value_enum, default_value_t = Generation::Series30i)]
     generation: Generation,
@@ -72,7 +79,7 @@ impl Generation {
     }
 }
 
-fn build_control(arguments: &FanucArguments, machine: Simulated, clock: Arc<dyn Clock>) -> SimulatedControl {
+fn build_control(arguments: &ControlArguments, machine: Simulated, clock: Arc<dyn Clock>) -> SimulatedControl {
     let rule = match arguments.ladder {
         Rule::Least => LadderRule::Least,
         Rule::Product => LadderRule::Product,
@@ -83,17 +90,33 @@ fn build_control(arguments: &FanucArguments, machine: Simulated, clock: Arc<dyn 
     if arguments.paths > 1 { control.with_path() } else { control }
 }
 
-/// Serves until told to stop.
-pub(super) fn serve(arguments: &FanucArguments) -> CommandResult {
-    let at = arguments.common.listen_address(8193);
-    let next = "stop the other program, or choose another port with --listen";
+/// A control that answers until it is dropped.
+pub(super) struct ServedControl {
+    stop: Arc<AtomicBool>,
+    ladder: Option<std::thread::JoinHandle<()>>,
+}
+
+impl Drop for ServedControl {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::SeqCst);
+        // A ladder that panicked has said so on standard error.
+        let _ended = self.ladder.take().map(std::thread::JoinHandle::join);
+    }
+}
+
+/// Puts the machine behind a control that listens here, and says where.
+pub(super) fn start(
+    control: &ControlArguments,
+    at: SocketAddr,
+    running: &RunningMachine,
+) -> Result<ServedControl, CannotRun> {
+    let next = "stop the other program, or choose another port";
     let listener = TcpListener::bind(at).map_err(|error| CannotRun::new(format!("{at}: {error}"), next))?;
-    let RunningMachine { machine, clock } = arguments.common.start_machine()?;
-    let control = build_control(arguments, machine, clock);
-    let settings = ServerSettings { sessions_max: usize::from(arguments.connections), ..ServerSettings::default() };
+    let simulated = build_control(control, running.machine.clone(), running.clock.clone());
+    let settings = ServerSettings { sessions_max: usize::from(control.connections), ..ServerSettings::default() };
     let no_threads = |error| CannotRun::new(format!("no threads to serve with: {error}"), "");
-    let server = Server::start(listener, Box::new(control), settings).map_err(no_threads)?;
-    let further = if arguments.paths > 1 { "; those of path 2 are 20 higher" } else { "" };
+    let server = Server::start(listener, Box::new(simulated), settings).map_err(no_threads)?;
+    let further = if control.paths > 1 { "; those of path 2 are 20 higher" } else { "" };
     print_text(&format!(
         "fanuc://{} answers; the ladder's mailbox is at R900, requests at R905, the dial at R907, its second override \
          at R910{further}\n",
@@ -107,9 +130,12 @@ pub(super) fn serve(arguments: &FanucArguments) -> CommandResult {
             std::thread::sleep(LOOK);
         }
     });
-    let outcome = until_stopped();
-    stop.store(true, Ordering::SeqCst);
-    // A ladder that panicked has said so on standard error.
-    let _ended = ladder.join();
-    outcome
+    Ok(ServedControl { stop, ladder: Some(ladder) })
+}
+
+/// Serves until told to stop.
+pub(super) fn serve(arguments: &FanucArguments) -> CommandResult {
+    let running = arguments.common.start_machine()?;
+    let _served = start(&arguments.control, arguments.common.listen_address(8193), &running)?;
+    until_stopped()
 }

@@ -2,6 +2,7 @@
 //! a machine.
 
 mod fanuc;
+mod machine;
 mod modbus;
 mod nclink;
 mod waveform;
@@ -23,6 +24,8 @@ const STARTED_S: f64 = 30.0;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Served {
+    /// One machine on FANUC and Modbus at once, and as an NC-Link device where a broker is named.
+    Machine(machine::MachineArguments),
     /// A FANUC control that answers FOCAS2/Ethernet, with a ladder that owns the feed override.
     Fanuc(fanuc::FanucArguments),
     /// An NC-Link device (GB/T 41970) at an MQTT broker, laid out like a Huazhong controller.
@@ -57,27 +60,33 @@ impl Common {
     }
 
     fn start_machine(&self) -> Result<RunningMachine, CannotRun> {
-        let whole = self.machine.contains(':');
-        let text = if whole { self.machine.clone() } else { format!("simulated://{}", self.machine) };
-        let address: Address = text.parse().map_err(|error| CannotRun::new(format!("{error}"), ""))?;
-        let Target::Simulated(target) = address.target() else {
-            return Err(CannotRun::new(format!("{text} is no simulated machine"), "give lathe or mill"));
-        };
-        let Speed::Times(speed) = target.speed else {
-            return Err(CannotRun::new("a served machine lives by the clock", "give a factor, for example speed=10"));
-        };
-        let clock: Arc<dyn Clock> = Arc::new(ScaledClock::new(speed));
-        // A partner answers from its first moment: the machine has been switched on and its control has started.
-        let target = SimulatedTarget { begun_s: target.begun_s.max(STARTED_S), ..*target };
-        let begun_ns = adapters::open::compute_day_start_ns(&target, clock.now_ns());
-        let machine = Simulated::new(address.text(), SimulatedSettings::from_target(&target), begun_ns);
-        Ok(RunningMachine { machine, clock })
+        start_machine(&self.machine)
     }
+}
+
+/// Switches on the machine of this name or address.
+fn start_machine(machine: &str) -> Result<RunningMachine, CannotRun> {
+    let whole = machine.contains(':');
+    let text = if whole { machine.to_owned() } else { format!("simulated://{machine}") };
+    let address: Address = text.parse().map_err(|error| CannotRun::new(format!("{error}"), ""))?;
+    let Target::Simulated(target) = address.target() else {
+        return Err(CannotRun::new(format!("{text} is no simulated machine"), "give lathe or mill"));
+    };
+    let Speed::Times(speed) = target.speed else {
+        return Err(CannotRun::new("a served machine lives by the clock", "give a factor, for example speed=10"));
+    };
+    let clock: Arc<dyn Clock> = Arc::new(ScaledClock::new(speed));
+    // A partner answers from its first moment: the machine has been switched on and its control has started.
+    let target = SimulatedTarget { begun_s: target.begun_s.max(STARTED_S), ..*target };
+    let begun_ns = adapters::open::compute_day_start_ns(&target, clock.now_ns());
+    let machine = Simulated::new(address.text(), SimulatedSettings::from_target(&target), begun_ns);
+    Ok(RunningMachine { machine, clock })
 }
 
 /// Serves until told to stop.
 pub(super) fn run(what: &Served) -> CommandResult {
     match what {
+        Served::Machine(arguments) => machine::serve(arguments),
         Served::Fanuc(arguments) => fanuc::serve(arguments),
         Served::Nclink(arguments) => nclink::serve(arguments),
         Served::Modbus(arguments) => modbus::serve(arguments),

@@ -21,11 +21,37 @@ pub(in crate::cli) struct NclinkArguments {
     serial: String,
 }
 
-fn parse_serial(text: &str) -> Result<String, String> {
+pub(super) fn parse_serial(text: &str) -> Result<String, String> {
     match text.is_empty() || text.contains(['/', '+', '#', '?']) {
         true => Err("give letters and digits without / + # ?".to_owned()),
         false => Ok(text.to_owned()),
     }
+}
+
+/// A device that answers until it is dropped.
+pub(super) struct ServedDevice {
+    stop: Arc<AtomicBool>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+impl Drop for ServedDevice {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::SeqCst);
+        // A device that panicked has said so on standard error.
+        let _ended = self.thread.take().map(std::thread::JoinHandle::join);
+    }
+}
+
+/// Makes the machine a device at a broker, and says so when it is connected.
+pub(super) fn start(broker: &str, serial: &str, running: &RunningMachine) -> Result<ServedDevice, CannotRun> {
+    let options = parse_broker(broker)?;
+    let mut device = NcLinkDevice::new(serial, &running.machine, running.clock.clone());
+    let stop = Arc::new(AtomicBool::new(false));
+    let (stopping, name) = (stop.clone(), format!("nclink://{broker}/{serial}"));
+    let run = move || device.run(&options, &stopping, |said| print_text(&format_event(&name, &said)));
+    let thread = std::thread::Builder::new().name("device".to_owned()).spawn(run);
+    let thread = thread.map_err(|error| CannotRun::new(format!("no thread for the device: {error}"), ""))?;
+    Ok(ServedDevice { stop, thread: Some(thread) })
 }
 
 /// Serves until told to stop.
@@ -36,19 +62,9 @@ pub(super) fn serve(arguments: &NclinkArguments) -> CommandResult {
             "give --broker HOST:PORT in place of --listen",
         ));
     }
-    let options = parse_broker(&arguments.broker)?;
-    let RunningMachine { machine, clock } = arguments.common.start_machine()?;
-    let mut device = NcLinkDevice::new(&arguments.serial, &machine, clock);
-    let stop = Arc::new(AtomicBool::new(false));
-    let (stopping, name) = (stop.clone(), format!("nclink://{}/{}", arguments.broker, arguments.serial));
-    let run = move || device.run(&options, &stopping, |said| print_text(&format_event(&name, &said)));
-    let thread = std::thread::Builder::new().name("device".to_owned()).spawn(run);
-    let thread = thread.map_err(|error| CannotRun::new(format!("no thread for the device: {error}"), ""))?;
-    let outcome = until_stopped();
-    stop.store(true, Ordering::SeqCst);
-    // A device that panicked has said so on standard error.
-    let _ended = thread.join();
-    outcome
+    let running = arguments.common.start_machine()?;
+    let _served = start(&arguments.broker, &arguments.serial, &running)?;
+    until_stopped()
 }
 
 fn parse_broker(text: &str) -> Result<Options, CannotRun> {

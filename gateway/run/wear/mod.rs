@@ -11,6 +11,7 @@ use gateway_config::Config;
 use gateway_pipeline::Pipeline;
 use gateway_status::WearStatus;
 use library::Library;
+use rules::estimators::NoEstimate;
 use rules::estimators::wear::{Observability, WorkReference};
 
 /// Who writes the events.
@@ -51,12 +52,14 @@ pub fn build_status(pipeline: &Pipeline) -> Option<WearStatus> {
     let wear = pipeline.wear();
     let (model, outlook) = (wear.model(), wear.current_outlook());
     let model = model?;
-    let limit = wear.limit().and_then(|limit| limit.as_ref().ok());
+    let computed = wear.limit().and_then(|limit| limit.as_ref().ok());
+    // The limit that rules compare with, and no other one: outside of the cuts of the model there is none.
+    let limit = wear.usable_limit().ok();
     let learned = outlook.filter(|(reference, _)| *reference == WorkReference::Model).map(|(_, outlook)| outlook);
     let outlook = outlook.map(|(_, outlook)| outlook);
     let why = match (wear.limit(), &outlook) {
         (Some(Err(why)), _) => Some(why.clone()),
-        (_, None) => Some("no part with this edge yet".to_owned()),
+        (_, None) => Some(explain_no_outlook(pipeline)),
         (_, Some(outlook)) if !outlook.observed => Some("the wear is not known well enough here".to_owned()),
         (None, _) => Some("no cut with this tool, material and operation yet".to_owned()),
         _ => None,
@@ -71,14 +74,22 @@ pub fn build_status(pipeline: &Pipeline) -> Option<WearStatus> {
         flank_wear_uncertainty_mm: learned.map(|outlook| 1.96 * outlook.wear_sd_mm),
         worn_probability: outlook.filter(|it| it.observed).map(|it| it.worn_probability),
         parts_left: outlook.filter(|it| it.observed).map(|it| it.parts_left),
-        observability: limit
+        observability: computed
             .map(|limit| limit.observability)
             .or(outlook.map(|it| match it.observed {
                 true => Observability::Observable,
                 false => Observability::NotObservableHere,
             }))
             .map(Observability::as_word),
-        extrapolated: limit.map_or(Vec::new(), |limit| limit.extrapolated.clone()),
+        extrapolated: computed.map_or(Vec::new(), |limit| limit.extrapolated.clone()),
         why,
     })
+}
+
+/// No part of this edge was seen: none was finished, or its cuts were made at a speed whose no-load power is not known.
+fn explain_no_outlook(pipeline: &Pipeline) -> String {
+    match pipeline.estimates().tool_growth_pct {
+        Err(reason) if reason != NoEstimate::NoPartYet => reason.to_string(),
+        _ => "no part with this edge yet".to_owned(),
+    }
 }

@@ -101,10 +101,13 @@ export class Brought {
   drawResults() {
     const all = this.known.diagnoses;
     const ticks = { has: () => false, add() {}, delete() {}, [Symbol.iterator]: [][Symbol.iterator] };
-    if (all.length) drawDiagnoses(this.latest, make("div"), all.slice(0, 1), this.context, ticks);
-    else fill(this.latest, []);
-    if (all[0]) this.latest.prepend(make("h3", "", all[0].file));
-    if (all[0]?.truth) this.latest.append(this.truth(all[0].truth));
+    // The answer of another file is no answer to the one that is open: it stands among the earlier ones.
+    const newest = all[0] && (!this.file || this.file.name === all[0].file) ? all[0] : null;
+    if (newest) {
+      drawDiagnoses(this.latest, make("div"), [newest], this.context, ticks);
+      this.latest.prepend(make("h3", "", newest.file));
+      if (newest.truth) this.latest.append(this.truth(newest.truth));
+    } else fill(this.latest, []);
     const fit = (d, which) =>
       quantity(
         d.diagnosis?.fit?.[which]?.held_out_rmse ?? d.diagnosis?.fit?.[which]?.rmse ?? null,
@@ -132,7 +135,7 @@ export class Brought {
     ];
     fill(
       this.past,
-      rows.length > 1 ? [make("h3", "", t("compared")), table(head, rows, { caption: t("compared") })] : [],
+      rows.length > (newest ? 1 : 0) ? [make("h3", "", t("compared")), table(head, rows, { caption: t("compared") })] : [],
     );
   }
 
@@ -150,6 +153,7 @@ export class Brought {
     if (!file) return;
     await this.act(async () => {
       if (!this.may()) throw new Error(t("sign_in_to_diagnose"));
+      this.begin(file.name);
       if (this.known && file.size > this.known.bytes_max)
         throw new Error(t("file_too_long", Math.round(this.known.bytes_max / 1048576)));
       say(this.note, t("reading_file", file.name));
@@ -165,11 +169,22 @@ export class Brought {
     });
   }
 
+  /** A file that is not understood yet: neither the columns nor the answer of another one stand below its name. */
+  begin(name) {
+    this.file = { key: null, name };
+    fill(this.understood, []);
+    if (this.known) this.drawResults();
+  }
+
   async open(key) {
     this.show(await ask(`/api/v1/files/${key}`));
+    this.drawResults();
   }
 
   async example(name) {
+    // An example is a file of its own: what was open is not what the answer will be of.
+    this.file = null;
+    fill(this.understood, []);
     await send(`/api/v1/gallery/${name}`, {});
     await this.look();
   }

@@ -29,6 +29,12 @@ export function mount(root, context) {
   return { update: (status) => view.follow(status), leave: () => view.leave() };
 }
 
+/** Seconds since 1970 as a field of date and time takes them, in the time of this computer. */
+function localMoment(s) {
+  const ms = Math.round(s) * 1000;
+  return new Date(ms - new Date(ms).getTimezoneOffset() * 60000).toISOString().slice(0, 19);
+}
+
 class HistoryView {
   constructor(root, context) {
     Object.assign(this, { root, context, data: new HistoryData(), plots: [], found: null, tab: "parts", by: "day" });
@@ -56,8 +62,15 @@ class HistoryView {
     const step = (text, label, act) =>
       make("button", "", text, { type: "button", "aria-label": label, title: label, onclick: act });
     this.ranges = ranges;
+    const moment = (key) =>
+      make("input", "", null, { type: "datetime-local", step: "1", "aria-label": t(key), onchange: () => this.typed() });
+    [this.fromField, this.toField] = [moment("from"), moment("to")];
     const tools = make("div", "head", [
       make("div", "buttons", ranges),
+      make("div", "buttons", [
+        make("label", "field", [t("from"), this.fromField]),
+        make("label", "field", [t("to"), this.toField]),
+      ]),
       make("div", "buttons", [
         step("◀", t("earlier"), () => this.move.pan(-0.5)),
         step("▶", t("later"), () => this.move.pan(0.5)),
@@ -157,6 +170,14 @@ class HistoryView {
     this.look(Math.max(this.first, to - seconds), to, true);
   }
 
+  /** The time that was typed, in the time of this computer. */
+  typed() {
+    const [from, to] = [this.fromField, this.toField].map((field) => Date.parse(field.value) / 1000);
+    if (!Number.isFinite(from) || !Number.isFinite(to)) return;
+    if (from < to) this.look(from, to, true);
+    else say(this.note, t("from_before_to"));
+  }
+
   /** Looks at another time: at once with what is there, then with what the history says. */
   look(from, to, now = false) {
     [this.from, this.to] = [from, Math.max(to, from + SHORTEST_S)];
@@ -230,6 +251,12 @@ class HistoryView {
       this.text,
       `${dateTime(this.from * 1000)} – ${width < 86400 ? clock(this.to * 1000) : dateTime(this.to * 1000)} (${duration(width)})`,
     );
+    // What a person is typing is not overwritten.
+    for (const [field, s] of [
+      [this.fromField, this.from],
+      [this.toField, this.to],
+    ])
+      if (document.activeElement !== field) field.value = localMoment(s);
     for (const button of this.ranges)
       button.setAttribute(
         "aria-pressed",

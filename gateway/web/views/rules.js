@@ -57,11 +57,12 @@ class RulesView {
       backtest: button("backtest", () => this.backtest()),
       activate: button("activate", () => this.activate(), "primary"),
       discard: button("discard_draft", () => this.discard()),
+      remove: button("remove_rule", () => this.remove()),
     };
     const tools = make("div", "head", [
       make("div", "buttons", [this.actions.save, this.actions.trial]),
       make("div", "buttons", [this.actions.backtest, this.since]),
-      make("div", "buttons", [this.actions.activate, this.actions.discard]),
+      make("div", "buttons", [this.actions.activate, this.actions.discard, this.actions.remove]),
     ]);
     this.title = make("h2", "", t("scripts"));
     this.fresh = make("button", "", t("new_rule"), { type: "button", onclick: () => createRule(this) });
@@ -153,6 +154,7 @@ class RulesView {
         !may ||
         this.busy ||
         (name === "save" && !this.changed()) ||
+        (name === "remove" && !this.file()?.digest) ||
         (name === "discard" && !this.changed() && !this.file()?.draft) ||
         (name === "activate" && !this.changed() && !this.file()?.draft);
     if (!may && this.context.session) say(this.note, t("sign_in_to_edit"));
@@ -227,6 +229,16 @@ class RulesView {
     this.texts.delete(this.current);
     await this.reload();
     this.open(this.current);
+  }
+
+  /** Out of charge; the text stays as a draft, which can be put back or discarded. */
+  async remove() {
+    const name = this.current;
+    await ask(`/api/v1/rules/${name}`, { method: "DELETE" });
+    this.texts.delete(name);
+    await this.reload();
+    this.open(name);
+    say(this.note, t("rule_removed", name));
   }
 
   async reload() {

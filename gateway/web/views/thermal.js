@@ -4,7 +4,7 @@ import { ask, card, fill, make, row, say, table } from "/web/parts.js";
 import { folder, number, quantity } from "/web/format.js";
 import { t } from "/web/words.js";
 import { TimePlot, drawnFrom } from "/web/plot.js";
-import { columns } from "/web/history-data.js";
+import { columns, resolutionFor } from "/web/history-data.js";
 
 const TEMPERATURE = /(_temperature_c|^temperature_\d+_c)$/;
 const SPAN_S = 8 * 3600;
@@ -33,14 +33,20 @@ export function mount(root, context) {
     const status = context.status();
     if (!status) return;
     try {
-      const known = (await ask("/api/v1/series")).series.map((s) => s.name);
+      const stored = await ask("/api/v1/series");
+      const known = stored.series.map((s) => s.name);
       const wanted = known.filter((n) => TEMPERATURE.test(n) && context.quantity(n)).slice(0, 6);
       const [measured, predicted] = ["thermal_error_um", "thermal_predicted_um"].map((n) =>
         known.includes(n) ? n : null,
       );
       const names = [...wanted, measured, predicted].filter(Boolean);
       const [from, to] = [new Date(status.at_ms - SPAN_S * 1000).toISOString(), new Date(status.at_ms).toISOString()];
-      const found = await ask(`/api/v1/samples?from=${from}&to=${to}&channels=${names.join(",")}&resolution_s=60`);
+      // A history of seconds has no whole minute yet.
+      const there = Math.min(SPAN_S, Math.max(0, (status.at_ms - stored.first_ms) / 1000));
+      const resolution = Number.isFinite(there) ? resolutionFor(there) : 0;
+      const found = await ask(
+        `/api/v1/samples?from=${from}&to=${to}&channels=${names.join(",")}&resolution_s=${resolution}`,
+      );
       draw(found.series, wanted, measured, predicted, status);
     } catch (problem) {
       say(note, problem.message);

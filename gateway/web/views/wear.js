@@ -133,13 +133,17 @@ function drawEdge(lamp, facts, status, context) {
         ),
         row(t("wear_form"), t(`form_${wear.form}`)),
       ]
-    : [row(t("no_wear_model"), "", t("no_wear_model_words"))];
+    : [row(t("no_wear_model"), "", `${box(status.no_wear_model ?? "")}. ${t("no_wear_model_words")}`)];
   const cutting = context.quantity("cutting_power_w");
   rows.unshift(
     row(
       t("short_cutting_power_w"),
-      cutting && !cutting.missing ? quantity(cutting.value, "W") : context.reason(cutting?.missing ?? "not_provided"),
-      t("wear_judged"),
+      cutting && !cutting.missing
+        ? `${quantity(cutting.value, "W")} ± ${quantity(cutting.uncertainty, "W")}`
+        : context.reason(cutting?.missing ?? "not_provided"),
+      status.state.load_loss_origin === "not_commissioned"
+        ? `${t("loss_not_commissioned", t("wear_judged"))}`
+        : t("wear_judged"),
     ),
   );
   rows.push(
@@ -251,19 +255,31 @@ function drawFigure(figure, below, state) {
         ],
       },
     },
-    [use.map((u) => u.at), pick("limit_w"), pick("cutting_power_w"), pick("wear_mm")],
+    [use.map((u) => u.at), pick("limit_w"), use.map((u) => powerBesideLimit(u.tool)), pick("wear_mm")],
     figure,
   );
   say(below, told(use.at(-1)));
   return plot;
 }
 
+/** The power of the cuts that have the limit, where there is one: other cuts of the part are heavier or lighter. */
+function powerBesideLimit(tool) {
+  return tool.limit_w === null ? tool.cutting_power_w : (tool.power_at_limit_w ?? null);
+}
+
 function told({ part, tool }) {
-  const power = tool.cutting_power_w === null ? "–" : quantity(tool.cutting_power_w, "W");
+  const watts = powerBesideLimit(tool);
+  const power = watts === null ? "–" : quantity(watts, "W");
   const limit = tool.limit_w === null ? "–" : quantity(tool.limit_w, "W");
   const wear =
     tool.wear_mm === null ? "–" : `${number(tool.wear_mm, "mm")} ± ${quantity(tool.wear_uncertainty_mm ?? 0, "mm")}`;
-  return t("wear_told", dateTime(part.to_ms), power, limit, wear);
+  const share = watts !== null && tool.limit_w > 0 ? ` (${number((100 * watts) / tool.limit_w)} %)` : "";
+  return t("wear_told", dateTime(part.to_ms), `${power}${share}`, limit, wear);
+}
+
+/** A share of the variance in percent. What rounds to 100 is not all of it. */
+function share(r2) {
+  return r2 < 1 && r2 >= 0.9995 ? "> 99.9 %" : `${number(100 * r2)} %`;
 }
 
 function drawModels(root, models) {
@@ -277,7 +293,7 @@ function drawModels(root, models) {
     t(`form_${m.form}`),
     { num: quantity(m.criterion_mm, "mm") },
     { num: String(m.cuts) },
-    { num: `${number(100 * m.r2)} %` },
+    { num: `${share(m.r2)}, ± ${quantity(1.96 * m.residual_sd_w, "W")}` },
     m.in_force ? t("in_charge") : t("replaced"),
   ]);
   fill(root, [
@@ -311,7 +327,7 @@ async function drawVariance(root) {
     ]);
   if (!anova) return fill(root, [make("p", "empty", found.error ?? t("anova_where", folder(found.file)))]);
   const cell = (value) => ({ num: value === null || value === undefined ? "–" : number(value) });
-  const percent = (share) => (share === null ? "–" : number(100 * share));
+  const percent = (of) => (of === null ? "–" : share(of).replace(" %", ""));
   const rows = anova.sources.map((s) => [
     s.source,
     cell(s.sum_of_squares),

@@ -15,6 +15,7 @@ export const HISTORY = {
   choose_channels: ["Choose channels", "选择通道"],
   no_history_yet: ["Nothing is stored yet. Come back in a minute.", "尚无历史记录，请稍后再来。"],
   newest: ["Newest", "最新"],
+  from_before_to: ["The beginning is not before the end.", "开始时间须早于结束时间。"],
   tab_parts: ["Parts", "工件"],
   tab_use: ["Use of the machine", "利用率"],
   tab_marks: ["Alarms and overrides", "报警与倍率"],

@@ -18,6 +18,11 @@ export const RULES = {
   backtest: ["Backtest", "历史回放"],
   activate: ["Activate", "启用"],
   discard_draft: ["Discard draft", "放弃草稿"],
+  remove_rule: ["Take out of charge", "停用"],
+  rule_removed: [
+    "{0} is out of charge. Its text stays here as a draft: activate it again, or discard it.",
+    "{0} 已停用，其内容保留为草稿：可再次启用，或放弃草稿。",
+  ],
   backtest_span: ["How much history", "回放时长"],
   last_span: ["last {0}", "最近 {0}"],
   words_title: ["Words and cookbook", "词汇与示例"],

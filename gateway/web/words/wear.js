@@ -46,11 +46,14 @@ export const WEAR = {
   many: ["very many", "很多"],
   no_wear_parts: ["No part was cut with this tool yet.", "尚无该刀具的工件。"],
   part_number: ["Part", "工件序号"],
-  wear_told: ["Part of {0}: measured {1}, limit {2}, flank wear {3}", "{0} 的工件：实测 {1}，阈值 {2}，磨损 {3}"],
+  wear_told: [
+    "Part of {0}: measured {1} of the limit {2}, over the cuts that have one; flank wear {3}",
+    "{0} 的工件：实测 {1}，阈值 {2}（仅有阈值的切削）；磨损 {3}",
+  ],
   any: ["any", "任意"],
   machine: ["Machine", "机床"],
   cuts: ["Cuts", "切削数"],
-  in_charge: ["in charge", "生效"],
+  in_charge: ["in force", "有效"],
   replaced: ["replaced", "已替换"],
   anova_where: [
     "Which factor counts how much stands here as soon as a wear model is identified for this box: cnc-gateway commission --write, or cnc-gateway identify tool-wear --data-dir {0}",

@@ -1,27 +1,26 @@
 //! From a sample to estimates.
 
 mod reconfigure;
+mod split;
 mod stand_in;
 mod stored_state;
 mod voltage;
 
 use super::detector::{Detected, Detector};
-use super::estimate::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, Visibility};
+use super::estimate::{Estimate, Estimates, NoEstimate};
+use super::estimate_words::{NoLoadOrigin, Visibility};
 use super::inputs::{InputChannels, TickInputs};
 use super::learning::{IdleTick, Learner};
 use super::loads::LoadEstimator;
 use super::no_load::{NoLoad, NoLoadPoint, NoLoadTable};
 use super::settings::Settings;
 use super::signals::{Feed, Pace, Signals};
-use super::situation::{Tick, visible_excess_w};
+use super::situation::Tick;
 use super::state::State;
 use super::supply::Supply;
 use adapter_core::{ChannelId, Sample};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
-
-/// Power this many standard deviations below no-load power is no cutting power of zero but a contradiction.
-const BELOW_NO_LOAD_SD: f64 = 3.0;
 
 /// Weight of a new sample in the standby power.
 const STANDBY_WEIGHT: f64 = 0.1;
@@ -273,7 +272,7 @@ impl Inference {
         .map(|known| self.at_voltage(known, inputs));
         // Where a no-load power is known, a speed is.
         let speed_rpm = inputs.speed.unwrap_or(0.0);
-        let (cutting_power_w, load_loss_w) = self.split_power(filtered, steady.and(reference), speed_rpm);
+        let parts = self.split_power(filtered, steady.and(reference), speed_rpm);
         let estimates = Estimates {
             at_ns: inputs.at_ns,
             state: verdict.state,
@@ -283,8 +282,10 @@ impl Inference {
             unknown_because: verdict.because,
             filtered_power_w: filtered,
             no_load_power_w: reference.map(|known| Estimate { value: known.power_w, sd: known.sd_w }),
-            cutting_power_w,
-            load_loss_w,
+            cutting_power_w: parts.map(|it| it.cutting_power_w),
+            load_loss_w: parts.map(|it| it.load_loss_w),
+            cutting_power_common_sd_w: parts.map_or(0.0, |it| it.common_sd_w),
+            load_loss_origin: self.load_loss_origin(),
             visible_cutting_power_w: self.least_visible(reference.and(no_load), speed_rpm),
             no_load_origin: reference.map_or(NoLoadOrigin::None, |known| known.origin),
             noise_gain: reference.map_or(0.0, |known| known.noise_gain),
@@ -315,50 +316,6 @@ impl Inference {
                 inputs.power.map(|_| ()).map_err(|absence| self.explain_missing_input(self.channels.power, absence))
             }
         }
-    }
-
-    fn split_power(
-        &self,
-        filtered: Estimated,
-        no_load: Result<NoLoad, NoEstimate>,
-        speed_rpm: f64,
-    ) -> (Estimated, Estimated) {
-        match no_load.and_then(|known| Ok((known, filtered?))) {
-            Err(reason) => (Err(reason), Err(reason)),
-            Ok((known, filtered)) => self.split_known(filtered, known, speed_rpm),
-        }
-    }
-
-    fn split_known(&self, filtered: Estimate, known: NoLoad, speed_rpm: f64) -> (Estimated, Estimated) {
-        let load_loss = self.settings.load_loss(self.state.signals.stage());
-        let excess_w = filtered.value - known.power_w;
-        let excess_sd_w = filtered.sd.hypot(known.sd_w);
-        if excess_w < -BELOW_NO_LOAD_SD * excess_sd_w {
-            return (Err(NoEstimate::BelowNoLoad), Err(NoEstimate::BelowNoLoad));
-        }
-        // Noise below no-load power is no negative cutting power.
-        let Some(split) = load_loss.split_excess_power(excess_w.max(0.0), speed_rpm) else {
-            return (Err(NoEstimate::Imbalance), Err(NoEstimate::Imbalance));
-        };
-        let by_linear_w = split.slope * split.cutting_power_w * self.settings.load_loss_sd;
-        let cutting_sd_w = (split.slope * excess_sd_w).hypot(by_linear_w);
-        let loss_sd_w = ((1.0 - split.slope) * excess_sd_w).hypot(by_linear_w);
-        (
-            Ok(Estimate { value: split.cutting_power_w, sd: cutting_sd_w }),
-            Ok(Estimate { value: split.load_loss_w, sd: loss_sd_w }),
-        )
-    }
-
-    /// Cutting power that would be noticed within one window.
-    fn least_visible(&self, no_load: Result<NoLoad, NoEstimate>, speed_rpm: f64) -> Estimated {
-        let known = no_load?;
-        let signals = &self.state.signals;
-        let noise_w = signals.noise.sd() * known.power_w;
-        let excess_w = visible_excess_w(known, signals, &self.settings)
-            + self.settings.cutting_evidence * noise_w / self.settings.window_samples;
-        let load_loss = self.settings.load_loss(signals.stage());
-        let split = load_loss.split_excess_power(excess_w, speed_rpm).ok_or(NoEstimate::Imbalance)?;
-        Ok(Estimate { value: split.cutting_power_w, sd: split.slope * known.sd_w })
     }
 
     fn classify_visibility(

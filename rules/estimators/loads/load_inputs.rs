@@ -104,7 +104,7 @@ impl LoadChannels {
             feeds_in_air: estimates.state == State::Idle && feed.is_some_and(|feed| feed > 0.0),
             coolant_on: number(self.coolant).map(|on| on > 0.5),
             state_s: seconds_between(estimates.since_ns, sample.at_ns),
-            cutting_power_w: estimates.cutting_power_w.ok().map(|it| (it.value, it.sd)),
+            cutting_power_w: estimates.comparable_cutting_power().ok().map(|it| (it.value, it.sd)),
             spindle_power_w: number(self.spindle_power),
             spindle_current_a: number(self.current),
             spindle_load_pct: number(self.load),

@@ -17,6 +17,8 @@
 
 mod accuracy;
 mod cuts;
+#[cfg(test)]
+mod doubt_tests;
 mod forms;
 mod load_loss;
 mod no_load;

@@ -61,23 +61,33 @@ impl fmt::Display for NoLoadLearned {
     }
 }
 
+/// A deviation of 0 stands for a load loss that nobody has measured.
+const LEAST_SD: f64 = 1e-6;
+
 impl LoadLossLearned {
     /// The coefficients as settings that a script returns; the file can stand beside the other scripts as it is.
     #[must_use]
     pub fn format_script(&self) -> String {
         let mut text = String::from(
             "// Load loss by gear stage, identified from recordings: Pad = a0 Pc + a1 Pc^2. 附加载荷损耗系数\n\
-             // load_loss_speed_rpm: the speed at which a1 is as given; elsewhere it goes with 1/n^2. 0: the same at every speed. a1 对应的转速\n\n\
+             // load_loss_speed_rpm: the speed at which a1 is as given; elsewhere it goes with 1/n^2. 0: the same at every speed. a1 对应的转速\n\
+             // load_loss_sd: standard deviation of a0 + a1 Pc at Pc = load_loss_sd_at_w; load_loss_quadratic_sd_per_w: that of a1. 标准不确定度\n\n\
              fn settings() {\n    #{\n",
         );
-        for StageLearned { stage, linear, quadratic_per_w, speed_rpm, .. } in &self.stages {
-            let _ = writeln!(text, "        load_loss_linear_stage_{stage}: {},", number(linear.value));
-            let _ =
-                writeln!(text, "        load_loss_quadratic_per_w_stage_{stage}: {},", number(quadratic_per_w.value));
-            let _ = writeln!(text, "        load_loss_speed_rpm_stage_{stage}: {},", number(speed_rpm.unwrap_or(0.0)));
+        for StageLearned { stage, linear, quadratic_per_w, speed_rpm, doubt, .. } in &self.stages {
+            let settings = [
+                ("linear", linear.value),
+                ("quadratic_per_w", quadratic_per_w.value),
+                ("speed_rpm", speed_rpm.unwrap_or(0.0)),
+                ("sd", doubt.share_sd.clamp(LEAST_SD, 0.5)),
+                ("sd_at_w", doubt.at_w),
+                ("quadratic_sd_per_w", doubt.quadratic_sd_per_w.min(0.01)),
+                ("only_speed_rpm", doubt.only_speed_rpm.unwrap_or(0.0)),
+            ];
+            for (name, value) in settings {
+                let _ = writeln!(text, "        load_loss_{name}_stage_{stage}: {},", number(value));
+            }
         }
-        let sd = self.stages.iter().map(|stage| stage.share_at_mean.standard_error).fold(0.0, f64::max);
-        let _ = writeln!(text, "        load_loss_sd: {},", number(sd.min(0.5)));
         text + "    }\n}\n"
     }
 }

@@ -6,11 +6,12 @@
 use super::conditions::CutConditions;
 use super::edge_state::WearNews;
 use super::follow::WearFollower;
-use super::model_selection::choose_model;
+use super::model_selection::{choose_model, explain_no_model};
 use super::outlook::Outlook;
 use super::record::{WearKey, WearRecord};
 use super::threshold::{Observability, PowerLimit, compute_power_limit};
 use super::tool_name::tool_of;
+use super::unseen_edges::UnseenEdges;
 use super::work::{CutMoment, EdgeWork, ExpectedPower, WorkKey, WorkReference};
 use crate::loads::Figure;
 use crate::{Estimate, Estimated, Estimates, NoEstimate, State};
@@ -89,6 +90,7 @@ pub struct WearEstimator {
     news: Vec<WearNews>,
     /// Of the edge in use. They change when a part is finished or another edge is in use; until then they are not computed again.
     figures: Option<EdgeFigures>,
+    unseen: UnseenEdges,
 }
 
 /// What is known of an edge after its last part.
@@ -117,6 +119,7 @@ impl Default for WearEstimator {
             limit_ns: None,
             news: Vec::new(),
             figures: None,
+            unseen: UnseenEdges::default(),
         }
     }
 }
@@ -148,6 +151,28 @@ impl WearEstimator {
     #[must_use]
     pub fn limit(&self) -> Option<&Result<PowerLimit, String>> {
         self.limit.as_ref()
+    }
+
+    /// The same, where it is one that a power may be compared with: inside the cuts of the model, where wear can be seen.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn usable_limit(&self) -> Result<&PowerLimit, NoEstimate> {
+        match &self.limit {
+            None => Err(NoEstimate::NotCutting),
+            Some(Err(_)) => Err(NoEstimate::CutUnknown),
+            Some(Ok(limit)) if !limit.extrapolated.is_empty() => Err(NoEstimate::OutsideModel),
+            Some(Ok(limit)) if limit.observability == Observability::NotObservableHere => {
+                Err(NoEstimate::NotObservable)
+            }
+            Some(Ok(limit)) => Ok(limit),
+        }
+    }
+
+    /// Why no model of the library is for the cut of the moment, in a sentence; `None` where one is.
+    #[must_use]
+    pub fn explain_missing_model(&self) -> Option<String> {
+        self.model.is_none().then(|| explain_no_model(&self.models, &self.key_of_cut()))
     }
 
     /// How the edge in use stands after its last part.
@@ -182,6 +207,7 @@ impl WearEstimator {
         if counted || !(0..=PAUSE_NS).contains(&step_ns) {
             self.finish_part(sample.at_ns);
         }
+        self.unseen.watch_edge(self.texts[0].as_deref().unwrap_or_default(), estimates);
         let moment = self.read_cut_moment(sample, estimates);
         if let (Some(moment), 1..=STEP_MAX_NS) = (&moment, step_ns) {
             self.gather_work(moment, sample, step_ns as f64 / SECOND_NS as f64);
@@ -191,7 +217,7 @@ impl WearEstimator {
 
     /// The cut of this moment, where its power is known.
     fn read_cut_moment(&self, sample: &Sample, estimates: &Estimates) -> Option<CutMoment> {
-        let power = estimates.cutting_power_w.ok().filter(|_| estimates.state == State::Cutting)?;
+        let power = estimates.comparable_cutting_power().ok().filter(|_| estimates.state == State::Cutting)?;
         if sample.at_ns - estimates.since_ns < SETTLE_NS {
             return None;
         }
@@ -218,11 +244,14 @@ impl WearEstimator {
         }
     }
 
-    fn choose_model(&mut self) {
+    fn key_of_cut(&self) -> WearKey {
         let [tool, work_material, operation] =
             self.texts.each_ref().map(|text| text.as_deref().unwrap_or_default().to_owned());
-        let cut = WearKey { machine: self.machine.clone(), tool, work_material, operation };
-        let found = choose_model(&self.models, &cut, |model| model);
+        WearKey { machine: self.machine.clone(), tool, work_material, operation }
+    }
+
+    fn choose_model(&mut self) {
+        let found = choose_model(&self.models, &self.key_of_cut(), |model| model);
         let model = found.map(|choice| ModelInUse { record: choice.record.clone(), by: choice.by });
         let same = self.model.as_ref().map(|it| &it.record) == model.as_ref().map(|it| &it.record);
         self.model = model;
@@ -287,7 +316,8 @@ impl WearEstimator {
             Some(known) => known,
             None => self.compute_figures(),
         };
-        self.figures = Some(figures);
+        // Why an edge was never seen changes from tick to tick.
+        self.figures = Some(figures).filter(|_| self.current_outlook().is_some());
         (estimates.tool_wear_mm, estimates.tool_growth_pct) = (figures.wear_mm, figures.growth_pct);
         (estimates.tool_worn_probability, estimates.tool_parts_left) = (figures.worn_probability, figures.parts_left);
         (estimates.tool_limit_parts, estimates.tool_life_share) = (figures.limit_parts, figures.life_share);
@@ -308,7 +338,7 @@ impl WearEstimator {
             material_level_pct: material.map(|(share, sd)| Estimate { value: 100.0 * share, sd: 100.0 * sd }),
         };
         match self.current_outlook() {
-            None => without(NoEstimate::NoPartYet),
+            None => without(self.unseen.find_reason(self.edge_in_use()).unwrap_or(NoEstimate::NoPartYet)),
             Some((_, outlook)) if !outlook.observed => without(NoEstimate::NotObservable),
             Some((reference, outlook)) => fill_outlook(without(NoEstimate::NoModel), reference, &outlook),
         }
@@ -325,14 +355,7 @@ impl WearEstimator {
                 compute_power_limit(&record.model, &cut, record.criterion_mm).map_err(|refusal| refusal.to_string())
             }));
         }
-        match &self.limit {
-            Some(Ok(limit)) if !limit.extrapolated.is_empty() => Err(NoEstimate::OutsideModel),
-            Some(Ok(limit)) if limit.observability == Observability::NotObservableHere => {
-                Err(NoEstimate::NotObservable)
-            }
-            Some(Ok(limit)) => Ok(Estimate { value: limit.power_w, sd: limit.sd_w }),
-            _ => Err(NoEstimate::CutUnknown),
-        }
+        self.usable_limit().map(|limit| Estimate { value: limit.power_w, sd: limit.sd_w })
     }
 }
 

@@ -53,6 +53,7 @@ mod surface;
 mod term;
 mod threshold;
 mod tool_name;
+mod unseen_edges;
 mod work;
 
 pub use anova::{Anova, AnovaRow};

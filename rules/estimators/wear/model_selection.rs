@@ -2,6 +2,7 @@
 
 use super::record::{WearKey, WearRecord};
 use super::tool_name::tool_of;
+use std::sync::Arc;
 
 /// A model, and what speaks for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,6 +49,31 @@ pub fn choose_model<'a, R>(
     Some(ChosenModel { record, by: highest.map_or("any", |(_, word)| *word) })
 }
 
+/// Why none of these models is for a cut, in a sentence: what the nearest of them is for, and what the cut is.
+pub(super) fn explain_no_model(models: &[Arc<WearRecord>], cut: &WearKey) -> String {
+    let disagreements = |key: &WearKey| {
+        let tool = key.tool.is_empty() || key.tool == cut.tool || key.tool == tool_of(&cut.tool);
+        let pairs = [
+            ("machine", key.machine.clone(), cut.machine.clone()),
+            ("tool", if tool { String::new() } else { key.tool.clone() }, cut.tool.clone()),
+            ("work material", key.work_material.clone(), cut.work_material.clone()),
+            ("operation", key.operation.clone(), cut.operation.clone()),
+        ];
+        pairs.into_iter().filter(|(_, model, cut)| !model.is_empty() && model != cut).collect::<Vec<_>>()
+    };
+    let Some(nearest) = models.iter().rev().map(|model| disagreements(&model.key)).min_by_key(Vec::len) else {
+        return "the library has no wear model".to_owned();
+    };
+    let parts: Vec<String> = nearest
+        .into_iter()
+        .map(|(what, model, cut)| match cut.is_empty() {
+            true => format!("{what} {model}, and that of this cut is not known"),
+            false => format!("{what} {model}, and this cut is of {cut}"),
+        })
+        .collect();
+    format!("the wear model is for {}", parts.join("; "))
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::model::WearModel;
@@ -82,6 +108,12 @@ mod tests {
         assert_eq!(words, ["edge", "tool", "operation", "work material", "machine", "any"]);
         assert_eq!(by(&models, "T1-3", "steel", "rough").0.tool, "T1", "a new edge of a known tool");
         assert_eq!(by(&models, "T2", "brass", "bore"), (key(["m", "", "", ""]), "machine"));
+        let why = |texts: [&str; 4], cut: [&str; 4]| explain_no_model(&[Arc::new(record(texts))], &key(cut));
+        let told = why(["m", "", "C45", ""], ["m", "T1", "", ""]);
+        assert_eq!(told, "the wear model is for work material C45, and that of this cut is not known");
+        let told = why(["n", "T2", "", ""], ["m", "T1-2", "C45", ""]);
+        assert_eq!(told, "the wear model is for machine n, and this cut is of m; tool T2, and this cut is of T1-2");
+        assert_eq!(explain_no_model(&[], &key(["m", "T1", "", ""])), "the library has no wear model");
         assert_eq!(
             choose_model(&models[..1], &key(["m", "T1", "", ""]), |it| it),
             None,

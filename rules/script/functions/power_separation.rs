@@ -2,10 +2,9 @@
 
 use super::{Arguments, Method, MethodParameter, MethodResult, Subject, define_parameter};
 use estimators::regression::{Refusal, RefusalKind};
-use estimators::{LoadLossLaw, lagrange_weights, noise_gain, select_adjacent_speeds, solve_power_balance};
-
-/// Extrapolation that amplifies noise more than this is refused, as the estimators do.
-const GAIN_MAX: f64 = 3.0 + 1e-9;
+use estimators::{
+    EXTRAPOLATION_GAIN_MAX, LoadLossLaw, SpeedWeights, noise_gain, solve_power_balance, weigh_known_speeds,
+};
 
 pub(super) static SUBJECT: Subject = Subject { en: "Power separation", zh: "功率分离", methods: METHODS };
 
@@ -24,8 +23,8 @@ static METHODS: &[Method] = &[
         name: "interpolated_no_load_power_w",
         parameters: &[TABLE, define_parameter("speed_rpm", "rpm")],
         returns: "W",
-        en: "No-load power at a speed, by the parabola through the three nearest known speeds of one gear stage; no value where extrapolation amplifies noise more than three times",
-        zh: "由相邻三个已知转速二次插值空载功率",
+        en: "No-load power at a speed, by the parabola through three known speeds of one gear stage that hold it, or the straight line where that would amplify noise; the law of no_load_power_w; no value where extrapolation amplifies noise more than three times",
+        zh: "由相邻已知转速插值空载功率（与 no_load_power_w 同一定律）",
         run: |given| {
             let (powers_w, weights) = read_interpolation(given)?;
             Ok(MethodResult::Number(weights.iter().zip(powers_w).map(|(weight, power_w)| weight * power_w).sum()))
@@ -72,26 +71,25 @@ static METHODS: &[Method] = &[
     },
 ];
 
-/// Powers of the three speeds that are used, and their weights.
+/// Powers of the speeds that are used, and their weights.
 fn read_interpolation(given: &Arguments<'_>) -> Result<([f64; 3], [f64; 3]), Refusal> {
     let mut table = given.rows_of::<2>(0)?;
     let speed_rpm = given.number(1).abs();
     table.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let usable = table.iter().flatten().all(|number| number.is_finite() && *number > 0.0) && speed_rpm.is_finite();
     let distinct = table.windows(2).all(|pair| pair[1][0] > 1.001 * pair[0][0]);
-    if !usable || !distinct || table.len() < 3 {
+    let speeds: Vec<f64> = table.iter().map(|row| row[0]).collect();
+    let found = weigh_known_speeds(&speeds, speed_rpm).filter(|_| usable && distinct && table.len() >= 3);
+    let Some(SpeedWeights { law, .. }) = found else {
         let what = "the table has fewer than three speeds, one of them twice, or a number that is not positive";
         return Err(Refusal::new(RefusalKind::TooFew, what, "let the spindle idle at three speeds of this gear stage"));
-    }
-    let speeds: Vec<f64> = table.iter().map(|row| row[0]).collect();
-    let first = select_adjacent_speeds(&speeds, speed_rpm);
-    let weights = lagrange_weights([speeds[first], speeds[first + 1], speeds[first + 2]], speed_rpm);
-    let gain = noise_gain(&weights);
-    if gain > GAIN_MAX {
+    };
+    let gain = noise_gain(&law.weight);
+    if gain > EXTRAPOLATION_GAIN_MAX {
         let what = format!("{speed_rpm:.0} rpm lies too far from the known speeds (noise gain {gain:.1})");
         return Err(Refusal::new(RefusalKind::OutOfRange, what, "let the spindle idle at this speed"));
     }
-    Ok(([table[first][1], table[first + 1][1], table[first + 2][1]], weights))
+    Ok((law.at.map(|at| table[at][1]), law.weight))
 }
 
 fn split_excess_power(given: &Arguments<'_>) -> Result<estimators::Balance, Refusal> {

@@ -12,25 +12,42 @@ use adapter_core::channel::find_nearest_name;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use adapter_core::{Absence, ChannelId, Sample, Slot, Value};
 use estimators::loads::{Figure, LoadEstimator};
-use estimators::{Estimate, Estimated, Estimates, NoEstimate, State};
+use estimators::{Estimate, Estimated, Estimates, NoEstimate, NoLoadOrigin, State};
 use rhai::{Dynamic, ImmutableString};
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// A word for `unknown_because` that a trial does not take.
+/// A word for an inferred text that a trial does not take.
 #[derive(Debug)]
-struct UnknownReason {
+struct UnknownWord {
+    name: &'static str,
     word: String,
     /// Those that it takes.
-    words: [&'static str; 3],
+    words: Vec<&'static str>,
 }
 
-impl std::error::Error for UnknownReason {}
+impl std::error::Error for UnknownWord {}
 
-impl fmt::Display for UnknownReason {
+impl fmt::Display for UnknownWord {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "unknown_because = \"{}\": in a trial it is one of {}", self.word, self.words.join(", "))
+        write!(f, "{} = \"{}\": in a trial it is one of {}", self.name, self.word, self.words.join(", "))
     }
+}
+
+/// The one of `known` that has this word.
+fn find_by_word<T: Copy>(
+    name: &'static str,
+    value: &Dynamic,
+    known: &[T],
+    as_word: fn(T) -> &'static str,
+) -> Result<T, UnknownWord> {
+    let word = value.clone().into_immutable_string().unwrap_or_default();
+    let found = known.iter().copied().find(|it| as_word(*it) == word.as_str());
+    found.ok_or_else(|| UnknownWord {
+        name,
+        word: word.to_string(),
+        words: known.iter().copied().map(as_word).collect(),
+    })
 }
 
 /// When every trial begins.
@@ -117,8 +134,8 @@ impl TrialContext {
         if name == "state" {
             return self.give_state(value);
         }
-        if name == "unknown_because" {
-            return self.give_unknown_because(value).map_err(|refusal| refusal.to_string());
+        if matches!(name, "unknown_because" | "no_load_origin") {
+            return self.give_inferred_word(name, value).map_err(|refusal| refusal.to_string());
         }
         if let Some(id) = ChannelId::from_name(name) {
             return self.give_channel(id, value);
@@ -178,12 +195,21 @@ impl TrialContext {
     }
 
     /// Of the reasons with a number of their own the number is that of the channel; a trial needs none.
-    fn give_unknown_because(&mut self, value: &Dynamic) -> Result<(), UnknownReason> {
-        let word = value.clone().into_immutable_string().unwrap_or_default();
-        let known = [NoEstimate::NotYet, NoEstimate::Contradiction, NoEstimate::ControlSilent { power_w: 0.0 }];
-        let found = known.into_iter().find(|reason| reason.as_word() == word.as_str());
-        let refused = || UnknownReason { word: word.to_string(), words: known.map(NoEstimate::as_word) };
-        self.estimates.unknown_because = Some(found.ok_or_else(refused)?);
+    fn give_inferred_word(&mut self, name: &str, value: &Dynamic) -> Result<(), UnknownWord> {
+        if name == "no_load_origin" {
+            let found = find_by_word("no_load_origin", value, &NoLoadOrigin::ALL, NoLoadOrigin::as_word)?;
+            self.estimates.no_load_origin = found;
+            return Ok(());
+        }
+        let known = [
+            NoEstimate::NotYet,
+            NoEstimate::Contradiction,
+            NoEstimate::ControlSilent { power_w: 0.0 },
+            NoEstimate::NotLearned,
+            NoEstimate::Extrapolated { noise_gain: 10.0 },
+        ];
+        let found = find_by_word("unknown_because", value, &known, NoEstimate::as_word)?;
+        self.estimates.unknown_because = Some(found);
         Ok(())
     }
 

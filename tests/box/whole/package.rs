@@ -2,6 +2,7 @@
 
 use super::service::{PackagedBox, current, start_guard, write_program};
 use std::fs;
+use std::io::Write;
 use std::os::unix::fs::symlink;
 use std::os::unix::net::UnixDatagram;
 use std::process::{Command, Stdio};
@@ -66,6 +67,39 @@ fn a_box_is_set_up_with_one_command() {
         let channels = status["channels"].as_array()?.clone();
         channels.iter().any(|row| row["name"] == "program" && row["value"].is_string()).then_some(())
     });
+    gateway.stop();
+}
+
+/// Answers that are piped in are taken, the language is asked first, and what is started with the file alone knows the person whose token
+/// was shown.
+#[test]
+fn a_box_that_was_set_up_elsewhere_takes_the_token_that_was_shown() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let (config, data) = (directory.path().join("box.toml"), directory.path().join("data"));
+    let mut command = program();
+    command.args(["setup", "--out", text(&config), "--data-dir", "data"]).current_dir(directory.path());
+    let mut setup = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it starts");
+    let answers = "zh\nCK6136\nsimulated://lathe\nnone\nn\nLi\n";
+    setup.stdin.take().expect("piped").write_all(answers.as_bytes()).expect("answered");
+    let output = setup.wait_with_output().expect("it ends");
+    let said = stdout(&output);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains("机床名称") && said.contains("令牌"), "asked in Chinese: {said}");
+    let written = fs::read_to_string(&config).expect("written");
+    assert!(written.contains("language = \"zh\"") && written.contains("name = \"CK6136\""), "{written}");
+    assert!(written.contains(&format!("data_dir = \"{}\"", text(&data))), "{written}");
+    let token = said.lines().find(|line| line.contains("令牌") && line.contains("Li:")).expect("a token");
+    let token = token.rsplit(' ').next().expect("a token");
+    let mut command = program();
+    command.args(["run", "--config", text(&config), "--listen", "127.0.0.1:0"]);
+    let mut gateway = Gateway::spawn(command);
+    let address = gateway.address();
+    let body = format!("{{\"name\":\"Li\",\"token\":\"{token}\"}}");
+    let asked = format!(
+        "POST /api/v1/login HTTP/1.0\r\nHost: {address}\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
+        body.len()
+    );
+    assert_eq!(testkit::process::request(&address, &asked).status, 200, "the token of the setup signs in");
     gateway.stop();
 }
 

@@ -99,3 +99,35 @@ fn the_box_runs_with_two_meters() {
     let rows = text.lines().filter(whole).count();
     assert!(rows >= 10, "{rows} rows with both numbers in:\n{text}");
 }
+
+/// What the control says and what the meter draws are of one machine: the spindle takes power exactly while the control lets it turn.
+#[test]
+fn one_command_serves_one_machine_on_fanuc_and_modbus() {
+    let [fanuc, modbus] = [free_port(), free_port()].map(|port| format!("127.0.0.1:{port}"));
+    let machine = "simulated://lathe?dropouts_per_h=0&speed=20";
+    let mut command = program();
+    command.args(["serve", "machine", "--fanuc", &fanuc, "--modbus", &modbus, "--machine", machine]);
+    let mut child = command.stdout(Stdio::piped()).spawn().expect("the program starts");
+    let mut said = BufReader::new(child.stdout.take().expect("piped")).lines();
+    let _serving = Serving(child);
+    assert!(said.next().expect("it says where").expect("text").contains(&fanuc));
+    assert!(said.next().expect("it says where").expect("text").contains(&modbus));
+    let mut control = source(&format!("fanuc://{fanuc}"));
+    let mut meter = source(&format!("modbus-tcp://{modbus}?unit=2&profile=sdm630&circuit=spindle&timeout_ms=3000"));
+    let (mut turning, mut standing, mut agree) = (0, 0, 0);
+    let until = Instant::now() + Duration::from_secs(60);
+    while turning < 20 || standing < 5 {
+        assert!(Instant::now() < until, "{turning} turning, {standing} standing");
+        let rpm = number(&poll(control.as_mut()).expect("the control answers"), "spindle_speed_rpm").abs();
+        let watts = number(&poll(meter.as_mut()).expect("the meter answers"), "spindle_power_w");
+        // While it starts or stops a moment between the two polls decides.
+        if rpm > 300.0 {
+            (turning, agree) = (turning + 1, agree + u32::from(watts > 100.0));
+        } else if rpm < 1.0 {
+            (standing, agree) = (standing + 1, agree + u32::from(watts < 100.0));
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    println!("{agree} of {} agree", turning + standing);
+    assert!(10 * agree >= 9 * (turning + standing), "{agree} of {} agree", turning + standing);
+}

@@ -16,6 +16,8 @@ const BRAKING_W = 20;
 const SAME_MOMENT_SHARE = 0.03;
 const SAME_MOMENT_SD = 2;
 const PARTS = ["no_load_power_w", "load_loss_w", "cutting_power_w"];
+/** What the load loss of the drive enters. */
+const LOSSY = new Set(["load_loss_w", "cutting_power_w"]);
 
 /** The parts of the power, W, in whole watts that add up to `total`; or the word for why they are withheld. */
 export function split(quantity) {
@@ -81,7 +83,9 @@ export function strip() {
       const it = context.quantity(key);
       const withheld = !it || it.missing || why;
       say(cell, withheld ? "–" : shown(parts ? parts[at] : it.value, it.unit));
-      const deviation = it && !it.missing ? `± ${shown(it.uncertainty, it.unit)}` : "";
+      const width = it && !it.missing ? `± ${shown(it.uncertainty, it.unit)}` : "";
+      // Without a measured load loss the interval is that of drives of this kind, which a reader has to know.
+      const deviation = width && LOSSY.has(key) && status.state.load_loss_origin === "not_commissioned" ? t("loss_not_commissioned", width) : width;
       say(note, it?.missing ? context.reason(it.missing) : why ? t(why) : deviation);
     });
     bar.setAttribute(

@@ -1,7 +1,7 @@
 // What trials and a run over the history say about a draft.
 import { fill, make, row, say, table } from "/web/parts.js";
 import { duration, number } from "/web/format.js";
-import { t } from "/web/words.js";
+import { localTimes, t } from "/web/words.js";
 
 export function showTrials(view, found) {
   const lines = found.trials.map((r) =>
@@ -26,12 +26,16 @@ export function showTrials(view, found) {
 export function showBacktest(view, found) {
   const head = [t("what"), t("alarm_or_stop"), t("time"), t("why")];
   const rows = ["lost", "gained", "shifted"].flatMap((word) =>
-    found[word].map((d) => [
-      t(`backtest_${word}`),
-      d.name ?? d.what ?? "",
-      d.from ?? d.at ?? "",
-      [d.script, d.evidence, d.text].filter(Boolean).join(" · "),
-    ]),
+    found[word].map((d) => {
+      // What is at another time has two: that of the rules in charge, and that of the edited ones.
+      const [is, would] = d.running ? [d.running, d.edited] : [d, null];
+      return [
+        t(`backtest_${word}`),
+        is.name ?? "",
+        [is, would].filter(Boolean).map((it) => localTimes(it.from)).join(" → "),
+        [is.script, is.evidence, is.text].filter(Boolean).map(localTimes).join(" · "),
+      ];
+    }),
   );
   const states = found.seconds_per_state
     .filter((s) => Math.abs(s.running_s - s.edited_s) > 1)
