@@ -286,9 +286,14 @@ mod tests {
     #[test]
     fn the_limit_stands_beside_the_power_of_the_same_cuts() {
         let mut gathering = Gathering::default();
-        gathering.add_step(&cutting(3000.0), ("T1", ""), None, 6.0);
+        gathering.add_step(&cutting(3000.0), (share_name("T1").as_ref(), None), None, 6.0);
         let limit = Ok(Estimate { value: 252.0, sd: 5.0 });
-        gathering.add_step(&Estimates { wear_limit_w: limit, ..cutting(200.0) }, ("T1", ""), None, 2.0);
+        gathering.add_step(
+            &Estimates { wear_limit_w: limit, ..cutting(200.0) },
+            (share_name("T1").as_ref(), None),
+            None,
+            2.0,
+        );
         let tool = gathering.finish_part().tools.remove(0);
         assert_eq!(
             (tool.limit_w, tool.power_at_limit_w, tool.cutting_power_w),

@@ -257,12 +257,7 @@ fn build_ticker(
     let wake = inbox.wake.clone();
     let commands =
         way_to_machine::build_commands(plan, ways, inbox, &clock, pipeline.gate_mut(), history_store.stored_audit())?;
-    let identity = Identity {
-        machine: config.gateway.name.clone(),
-        simulated,
-        speed: plan.speed.time_factor(),
-        rate_hz: config.gateway.tick_hz,
-    };
+    let identity = build_identity(plan, simulated);
     let (publish, live) = watch::channel(None);
     #[expect(clippy::cast_possible_truncation, reason = "saturates, which is meant")]
     let stop_after_ns = plan.stop_after_s.map(|seconds| (seconds * SECOND_NS as f64) as i64);
@@ -305,6 +300,11 @@ fn build_ticker(
         },
         live,
     ))
+}
+
+fn build_identity(plan: &RunPlan, simulated: bool) -> Identity {
+    let gateway = &plan.config.gateway;
+    Identity { machine: gateway.name.clone(), simulated, speed: plan.speed.time_factor(), rate_hz: gateway.tick_hz }
 }
 
 /// Now; an accelerated machine begins after everything that the history already holds.

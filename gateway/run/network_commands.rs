@@ -21,7 +21,9 @@ impl Commands {
             let PostedRequest { request, reply, outcomes } = posted;
             self.record_audit(requests::build_audit_row(&request, &judgement, at_ns), gate, health);
             // Whoever has gone meanwhile finds both in the audit.
-            let _full = requests::build_outcome(&request, &judgement, at_ns).map(|outcome| outcomes.try_send(outcome));
+            if let Some(outcome) = requests::build_outcome(&request, &judgement, at_ns) {
+                let _full = outcomes.try_send(outcome);
+            }
             let _gone = reply.send(judgement.reply);
         }
     }

@@ -58,6 +58,23 @@ fn active_version(address: &str) -> String {
     found["version"].as_str().expect("a version").to_owned()
 }
 
+/// Out of charge with one click; the text stays as a draft and comes back with another one.
+fn take_out_and_back(browser: &mut Browser, address: &str, path: &std::path::Path, (before, original): (&str, &str)) {
+    assert!(press(browser, "remove").contains("is out of charge"));
+    assert!(!path.exists(), "the rule is removed from the directory");
+    wait_for("the box goes on without it", Duration::from_secs(20), || {
+        let status = testkit::process::get(address, "/api/v1/status").json();
+        status["scripts"].as_array()?.iter().all(|it| it["file"] != FILE).then_some(())
+    });
+    browser.wait_until("!cncGateway.view().rules.actions.activate.disabled");
+    press(browser, "activate");
+    wait_for("in charge again", Duration::from_secs(20), || {
+        let status = testkit::process::get(address, "/api/v1/status").json();
+        status["scripts"].as_array()?.iter().any(|it| it["version"] == before).then_some(())
+    });
+    assert_eq!(std::fs::read_to_string(path).expect("there"), original);
+}
+
 #[test]
 fn a_script_is_edited_tried_run_over_the_history_put_in_charge_and_taken_back() {
     if !browser::is_there() {
@@ -123,21 +140,7 @@ fn a_script_is_edited_tried_run_over_the_history_put_in_charge_and_taken_back() 
     wait_for("the version before", Duration::from_secs(20), || (active_version(&address) == before).then_some(()));
     assert_eq!(std::fs::read_to_string(data.join("scripts").join(FILE)).expect("there"), original);
 
-    // Out of charge with one click; the text stays as a draft and comes back with another one.
-    let path = data.join("scripts").join(FILE);
-    assert!(press(&mut browser, "remove").contains("is out of charge"));
-    assert!(!path.exists(), "the rule is removed from the directory");
-    wait_for("the box goes on without it", Duration::from_secs(20), || {
-        let status = testkit::process::get(&address, "/api/v1/status").json();
-        status["scripts"].as_array()?.iter().all(|it| it["file"] != FILE).then_some(())
-    });
-    browser.wait_until("!cncGateway.view().rules.actions.activate.disabled");
-    press(&mut browser, "activate");
-    wait_for("in charge again", Duration::from_secs(20), || {
-        let status = testkit::process::get(&address, "/api/v1/status").json();
-        status["scripts"].as_array()?.iter().any(|it| it["version"] == before.as_str()).then_some(())
-    });
-    assert_eq!(std::fs::read_to_string(&path).expect("there"), original);
+    take_out_and_back(&mut browser, &address, &data.join("scripts").join(FILE), (&before, &original));
     let audit = ask(&mut browser, "POST", "/api/v1/logout", &json!({}));
     assert_eq!(audit.0, 200);
     let rows = testkit::process::get(&address, "/api/v1/audit?limit=1000").json();
