@@ -135,7 +135,9 @@ export class Brought {
     ];
     fill(
       this.past,
-      rows.length > (newest ? 1 : 0) ? [make("h3", "", t("compared")), table(head, rows, { caption: t("compared") })] : [],
+      rows.length > (newest ? 1 : 0)
+        ? [make("h3", "", t("compared")), table(head, rows, { caption: t("compared") })]
+        : [],
     );
   }
 

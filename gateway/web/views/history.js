@@ -63,7 +63,12 @@ class HistoryView {
       make("button", "", text, { type: "button", "aria-label": label, title: label, onclick: act });
     this.ranges = ranges;
     const moment = (key) =>
-      make("input", "", null, { type: "datetime-local", step: "1", "aria-label": t(key), onchange: () => this.typed() });
+      make("input", "", null, {
+        type: "datetime-local",
+        step: "1",
+        "aria-label": t(key),
+        onchange: () => this.typed(),
+      });
     [this.fromField, this.toField] = [moment("from"), moment("to")];
     const tools = make("div", "head", [
       make("div", "buttons", ranges),

@@ -85,7 +85,10 @@ export function strip() {
       say(cell, withheld ? "–" : shown(parts ? parts[at] : it.value, it.unit));
       const width = it && !it.missing ? `± ${shown(it.uncertainty, it.unit)}` : "";
       // Without a measured load loss the interval is that of drives of this kind, which a reader has to know.
-      const deviation = width && LOSSY.has(key) && status.state.load_loss_origin === "not_commissioned" ? t("loss_not_commissioned", width) : width;
+      const deviation =
+        width && LOSSY.has(key) && status.state.load_loss_origin === "not_commissioned"
+          ? t("loss_not_commissioned", width)
+          : width;
       say(note, it?.missing ? context.reason(it.missing) : why ? t(why) : deviation);
     });
     bar.setAttribute(

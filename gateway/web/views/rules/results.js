@@ -32,7 +32,10 @@ export function showBacktest(view, found) {
       return [
         t(`backtest_${word}`),
         is.name ?? "",
-        [is, would].filter(Boolean).map((it) => localTimes(it.from)).join(" → "),
+        [is, would]
+          .filter(Boolean)
+          .map((it) => localTimes(it.from))
+          .join(" → "),
         [is.script, is.evidence, is.text].filter(Boolean).map(localTimes).join(" · "),
       ];
     }),
