@@ -79,7 +79,7 @@ fn a_box_that_was_set_up_elsewhere_takes_the_token_that_was_shown() {
     let mut command = program();
     command.args(["setup", "--out", text(&config), "--data-dir", "data"]).current_dir(directory.path());
     let mut setup = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it starts");
-    let answers = "zh\nCK6136\nsimulated://lathe\nnone\nn\nLi\n";
+    let answers = "zh\nCK6136\nsimulated://lathe?begun_s=600\nnone\nn\nLi\n";
     setup.stdin.take().expect("piped").write_all(answers.as_bytes()).expect("answered");
     let output = setup.wait_with_output().expect("it ends");
     let said = stdout(&output);
