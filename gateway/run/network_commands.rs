@@ -68,7 +68,7 @@ impl Commands {
     pub(super) fn settle_requests(&mut self, pipeline: &mut Pipeline, verdict: &Verdict, health: &mut Health) {
         let situation = GateSituation {
             verdict,
-            unarmed: pipeline.gate().override_arming().err(),
+            why_disarmed: pipeline.gate().override_arming().err(),
             control: self.control,
             ramping: pipeline.gate().is_ramping(),
             author: pipeline.scripts().decision().request.as_ref().map(|request| &*request.script),

@@ -58,13 +58,13 @@ pub struct NetworkRequests {
 
 impl NetworkRequests {
     /// Takes a request for a feed override or its end; gives what became of it, or `None` where the control has to show it first:
-    /// then [`NetworkRequests::settle_requests`] says it. `unarmed`: why nothing is written at present. The gate judges the request
+    /// then [`NetworkRequests::settle_requests`] says it. `why_disarmed`: why nothing is written at present. The gate judges the request
     /// all the same, and it is never written later. An alarm is acknowledged by whoever holds the alarms.
     pub fn accept_change(
         &mut self,
         (request, outcomes): (&NetworkRequest, &OutcomeSender),
         change: &RequestedChange,
-        unarmed: Option<Disarmed>,
+        why_disarmed: Option<Disarmed>,
         at_ns: TimeNs,
     ) -> RequestJudgement {
         let asker = Asker::of_request(request);
@@ -81,7 +81,7 @@ impl NetworkRequests {
             }
             _ => (100.0, "nothing is asked for any more".to_owned()),
         };
-        if let Some(why) = unarmed {
+        if let Some(why) = why_disarmed {
             let text = format!(
                 "nothing is written: {why}; the gate only judges {wanted_pct} %. Ask again when somebody has armed it"
             );
@@ -201,13 +201,13 @@ mod tests {
             asker: &str,
             id: &str,
             change: &RequestedChange,
-            unarmed: Option<Disarmed>,
+            why_disarmed: Option<Disarmed>,
             at_s: i64,
         ) -> RequestJudgement {
             let request = asked_by("plant", asker, id, change);
             let replaced = self.requests.replace_pending(&request, at_s * SECOND_NS);
             self.keep(replaced);
-            self.requests.accept_change((&request, &self.outcomes), change, unarmed, at_s * SECOND_NS)
+            self.requests.accept_change((&request, &self.outcomes), change, why_disarmed, at_s * SECOND_NS)
         }
 
         fn keep(&mut self, settled: Vec<SettledRequest>) {
@@ -244,7 +244,7 @@ mod tests {
     }
 
     fn situation(verdict: &Verdict, control: ControlState) -> GateSituation<'_> {
-        GateSituation { verdict, unarmed: None, control, ramping: false, author: Some("sink plant") }
+        GateSituation { verdict, why_disarmed: None, control, ramping: false, author: Some("sink plant") }
     }
 
     #[test]
@@ -335,7 +335,8 @@ mod tests {
         assert!(askers.tick(situation(&held, ControlState::AtDial)).is_empty());
         let held = verdict(60, Some(70.0), 100, GateOutcome::Held(Hold::Off));
         assert_eq!(askers.tick(situation(&held, ControlState::AtDial)), ["held not_followed held -"]);
-        let disarmed = GateSituation { unarmed: Some(Disarmed::ReadBack), ..situation(&held, ControlState::AtDial) };
+        let disarmed =
+            GateSituation { why_disarmed: Some(Disarmed::ReadBack), ..situation(&held, ControlState::AtDial) };
         assert_eq!(askers.tick(disarmed), ["lost failed read_back -"]);
         askers.ask("mes", "end", &change(80.0), None, 61);
         let ended = askers.requests.close_requests(62 * SECOND_NS);

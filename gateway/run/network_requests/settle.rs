@@ -37,7 +37,7 @@ pub struct GateSituation<'a> {
     /// What the gate has decided.
     pub verdict: &'a Verdict,
     /// Why no override is written, if so.
-    pub unarmed: Option<Disarmed>,
+    pub why_disarmed: Option<Disarmed>,
     /// The override at the control.
     pub control: ControlState,
     /// The gate lets the override change step by step and is not at its end.
@@ -67,8 +67,8 @@ pub(super) fn settle_unarmed(why: Disarmed) -> RequestEnding {
 }
 
 pub(super) fn settle_request(pending: &PendingRequest, situation: &GateSituation<'_>) -> Option<RequestEnding> {
-    let GateSituation { verdict, unarmed, .. } = situation;
-    if let Some(why) = unarmed {
+    let GateSituation { verdict, why_disarmed, .. } = situation;
+    if let Some(why) = why_disarmed {
         return Some(settle_unarmed(*why));
     }
     if !is_within(pending.until_ns, verdict.at_ns) {

@@ -18,14 +18,14 @@ const RIVALS_MAX: usize = 4;
 
 /// How well a file predicts.
 #[derive(Debug, Clone, Copy)]
-struct Prediction {
+struct WrittenPrediction {
     /// Logarithmic likelihood of rows left out, nats, but for a constant.
     log_likelihood: f64,
     /// Root mean square error of the rows that are told.
     error: f64,
 }
 
-impl Prediction {
+impl WrittenPrediction {
     /// Nats by which rows left out are likelier than with `other`; zero where the rows that are told say the opposite.
     fn compute_lead(self, other: Self) -> f64 {
         let lead = self.log_likelihood - other.log_likelihood;
@@ -66,14 +66,17 @@ impl EvidenceReport<'_, '_> {
         told
     }
 
-    fn measure_prediction(&self, textbook: &Textbook, written: &WrittenModel) -> Option<Prediction> {
+    fn measure_prediction(&self, textbook: &Textbook, written: &WrittenModel) -> Option<WrittenPrediction> {
         let square = self.prepare_left_out(textbook.fit.as_ref()?).compute_square().max(f64::MIN_POSITIVE);
         let rows = self.comparison.tempering * count_to_f64(self.comparison.rows.len());
-        Some(Prediction { log_likelihood: -0.5 * rows * square.ln(), error: self.compute_told_rmse(&written.total)? })
+        Some(WrittenPrediction {
+            log_likelihood: -0.5 * rows * square.ln(),
+            error: self.compute_told_rmse(&written.total)?,
+        })
     }
 
     /// The names with `rival` in its place, as they would be written; `None` where one of them has no law or an impossible one.
-    fn write_with_rival(&mut self, rival: &Rival) -> Option<((Textbook, WrittenModel), Prediction)> {
+    fn write_with_rival(&mut self, rival: &Rival) -> Option<((Textbook, WrittenModel), WrittenPrediction)> {
         let back = self.answer.exchange_name(rival);
         let textbook = self.fit_textbook_laws();
         let is_possible = textbook.laws.iter().all(Option::is_some) && self.list_refused_names(&textbook).is_empty();
