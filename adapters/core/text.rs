@@ -2,7 +2,7 @@
 //!
 //! A control in a Chinese shop sends GBK, one in a Japanese shop Shift JIS, a newer one UTF-8, and none of them says so. The
 //! address of a source names the set (`encoding=gbk`), or leaves it to be found out: what is UTF-8 is UTF-8; else the characters that come
-//! out tell ([`crate::text_set`]). Bytes that are no text in the set, or whose set is not known, are written as `\xB5`, so that they are never
+//! out tell (`text_set`). Bytes that are no text in the set, or whose set is not known, are written as `\xB5`, so that they are never
 //! lost: a text with such a mark in it gives its bytes back, and [`crate::plausibility`] tells of it.
 
 use crate::text_set::find_text;

@@ -1,6 +1,6 @@
 //! Who looks after the threads of a running box: what each does, and what follows when it breaks off.
 //!
-//! A panic of any thread is known to [`adapter_core`]'s list at the moment it happens (the hook of [`gateway_base::log::keep_crash_reports`]), whoever
+//! A panic of any thread is known to `adapter_core`'s list at the moment it happens (the hook of [`gateway_base::log::keep_crash_reports`]), whoever
 //! has caught it. The tick compares at every tick, before anything is decided: it disarms the gate, tells it as an event and as a problem of
 //! the status that stands until the process ends, and, where the thread is not started again, nobody can arm any more. A thread that hangs
 //! is the matter of [`service_manager`](super::service_manager): the sign of life of the whole process ends.

@@ -166,7 +166,7 @@ pub(crate) fn follow_step(scene: &Scene, stretch: &str, step: &[f64], deviation:
     Some(begun)
 }
 
-/// A stretch of runs as [`follow_step`] reads it.
+/// A stretch of runs as `follow_step` reads it.
 #[must_use]
 pub fn format_run_stretch(first: &str, last: &str) -> String {
     format!("{first}{RUN_TO_RUN}{last}")
