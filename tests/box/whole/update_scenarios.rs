@@ -130,6 +130,9 @@ fn try_killed_then_starts(mode: &str, after: Duration) -> usize {
         scenario.tried.restart_all();
         wait_for("a start", Duration::from_secs(10), || (scenario.tried.word() == "active").then_some(()));
     }
+    wait_for("a version to run after the starts", Duration::from_secs(30), || {
+        (scenario.tried.word() == "active" && scenario.tried.runs().is_some()).then_some(())
+    });
     let told = scenario.tried.update(&[]);
     scenario.check_words_of_report(&told);
     scenario.check_end(if mode == "good" { &["package", "0.2.0"] } else { &["package"] })
