@@ -1,5 +1,6 @@
 //! `cnc-gateway serve fanuc`: the simulated machine behind a control that answers FOCAS2/Ethernet.
 
+use super::guard::ServingThread;
 use super::{Common, RunningMachine, until_stopped};
 use crate::cli::{CannotRun, CommandResult, print_text};
 use adapters::LadderRule;
@@ -90,31 +91,17 @@ fn build_control(arguments: &ControlArguments, machine: Simulated, clock: Arc<dy
     if arguments.paths > 1 { control.with_path() } else { control }
 }
 
-/// A control that answers until it is dropped.
-pub(super) struct ServedControl {
-    stop: Arc<AtomicBool>,
-    ladder: Option<std::thread::JoinHandle<()>>,
-}
-
-impl Drop for ServedControl {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::SeqCst);
-        // A ladder that panicked has said so on standard error.
-        let _ended = self.ladder.take().map(std::thread::JoinHandle::join);
-    }
-}
-
 /// Puts the machine behind a control that listens here, and says where.
 pub(super) fn start(
     control: &ControlArguments,
     at: SocketAddr,
     running: &RunningMachine,
-) -> Result<ServedControl, CannotRun> {
+) -> Result<ServingThread, CannotRun> {
     let next = "stop the other program, or choose another port";
     let listener = TcpListener::bind(at).map_err(|error| CannotRun::new(format!("{at}: {error}"), next))?;
     let simulated = build_control(control, running.machine.clone(), running.clock.clone());
     let settings = ServerSettings { sessions_max: usize::from(control.connections), ..ServerSettings::default() };
-    let no_threads = |error| CannotRun::new(format!("no threads to serve with: {error}"), "");
+    let no_threads = |error: std::io::Error| CannotRun::new(format!("no threads to serve with: {error}"), "");
     let server = Server::start(listener, Box::new(simulated), settings).map_err(no_threads)?;
     let further = if control.paths > 1 { "; those of path 2 are 20 higher" } else { "" };
     print_text(&format!(
@@ -122,15 +109,13 @@ pub(super) fn start(
          at R910{further}\n",
         server.address()
     ));
-    let stop = Arc::new(AtomicBool::new(false));
-    let stopping = stop.clone();
-    let ladder = std::thread::spawn(move || {
-        while !stopping.load(Ordering::SeqCst) {
+    let run_ladder = move |stop: &AtomicBool| {
+        while !stop.load(Ordering::SeqCst) {
             server.with(|_| ());
             std::thread::sleep(LOOK);
         }
-    });
-    Ok(ServedControl { stop, ladder: Some(ladder) })
+    };
+    ServingThread::start("ladder", run_ladder).map_err(no_threads)
 }
 
 /// Serves until told to stop.

@@ -2,6 +2,7 @@
 //! a machine.
 
 mod fanuc;
+mod guard;
 mod machine;
 mod modbus;
 mod nclink;

@@ -1,12 +1,12 @@
 //! `cnc-gateway serve nclink`: the simulated machine as an NC-Link device. A device does not listen; it dials a broker.
 
+use super::guard::ServingThread;
 use super::{Common, RunningMachine, until_stopped};
 use crate::cli::{CannotRun, CommandResult, print_text};
 use adapters::mqtt::Options;
 use adapters::nclink_device::{DeviceEvent, MAILBOX, NcLinkDevice, OFFSETS};
 use clap::Args;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// Arguments of `serve nclink`.
 #[derive(Debug, Args)]
@@ -28,30 +28,14 @@ pub(super) fn parse_serial(text: &str) -> Result<String, String> {
     }
 }
 
-/// A device that answers until it is dropped.
-pub(super) struct ServedDevice {
-    stop: Arc<AtomicBool>,
-    thread: Option<std::thread::JoinHandle<()>>,
-}
-
-impl Drop for ServedDevice {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::SeqCst);
-        // A device that panicked has said so on standard error.
-        let _ended = self.thread.take().map(std::thread::JoinHandle::join);
-    }
-}
-
 /// Makes the machine a device at a broker, and says so when it is connected.
-pub(super) fn start(broker: &str, serial: &str, running: &RunningMachine) -> Result<ServedDevice, CannotRun> {
+pub(super) fn start(broker: &str, serial: &str, running: &RunningMachine) -> Result<ServingThread, CannotRun> {
     let options = parse_broker(broker)?;
     let mut device = NcLinkDevice::new(serial, &running.machine, running.clock.clone());
-    let stop = Arc::new(AtomicBool::new(false));
-    let (stopping, name) = (stop.clone(), format!("nclink://{broker}/{serial}"));
-    let run = move || device.run(&options, &stopping, |said| print_text(&format_event(&name, &said)));
-    let thread = std::thread::Builder::new().name("device".to_owned()).spawn(run);
-    let thread = thread.map_err(|error| CannotRun::new(format!("no thread for the device: {error}"), ""))?;
-    Ok(ServedDevice { stop, thread: Some(thread) })
+    let name = format!("nclink://{broker}/{serial}");
+    let run = move |stop: &AtomicBool| device.run(&options, stop, |said| print_text(&format_event(&name, &said)));
+    let thread = ServingThread::start("device", run);
+    thread.map_err(|error| CannotRun::new(format!("no thread for the device: {error}"), ""))
 }
 
 /// Serves until told to stop.
