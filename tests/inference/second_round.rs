@@ -160,7 +160,7 @@ fn a_ploughing_edge_is_told_from_losses_that_grow_with_the_cut() {
 
 #[test]
 fn an_offset_is_told_from_friction_and_from_a_gain() {
-    // Three times what the machine's own warm-up, which the model lacks, changes during the experiment: less is told as a drift of the zero.
+    // The lathe warms up during the experiment, which the model lacks: 40 W is told as a drift of the zero beside unknown, 120 W as what it is.
     let rounds = Rounds::run(MODEL, &[(60, 900.0, None)], |_| 120.0);
     rounds.leaves_open("offset");
     rounds.settle("offset", &["dry_friction", "viscous_friction", "windage", "sensor_gain"]);
