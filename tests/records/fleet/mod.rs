@@ -4,11 +4,10 @@
 //! they fail.
 
 mod boxes;
-mod cluster;
 mod killed;
 mod means;
 mod monitoring;
-mod partitions;
+pub(crate) mod partitions;
 mod pipeline;
 mod poison;
 mod postgres;

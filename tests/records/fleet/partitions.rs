@@ -14,7 +14,7 @@ const MIDNIGHT_NS: i64 = 19_700 * DAY_NS;
 const TICK_NS: i64 = 100_000_000;
 
 /// What `DuckDB` answers to a statement in this directory, as rows; `None` where it is not installed.
-fn duckdb(directory: &Path, statement: &str) -> Option<Vec<Vec<Json>>> {
+pub(crate) fn duckdb(directory: &Path, statement: &str) -> Option<Vec<Vec<Json>>> {
     let script = "import duckdb, json, sys\nrows = duckdb.sql(sys.argv[1]).fetchall()\n\
                   print(json.dumps([[v.decode() if isinstance(v, bytes) else v for v in row] for row in rows], default=str))";
     let said =

@@ -1,6 +1,9 @@
 //! Recordings as people have them: files that programs of others wrote (`tests/records/recordings/make_files.py`) come to the same numbers as the clean file,
 //! or are refused by name with the cure; none is read wrongly without a word.
 
+#[cfg(feature = "fleet")]
+mod codecs;
+
 use adapters::Recording;
 use adapters::recording::{ColumnMapping, Mapping, NoteKind, ReadRecording, TimeMapping, read_path_as};
 use serde::Deserialize;
