@@ -9,6 +9,7 @@
 //! `CNC_GATEWAY_CI` set.
 
 mod armed;
+mod clocked_kills;
 mod clocks;
 mod disarm;
 mod disks;
@@ -47,6 +48,8 @@ fn faults() -> Vec<Fault> {
         ("R12 clock leaps", clocks::leaps),
         ("R12 clock wrong at the start", clocks::wrong_at_start),
         ("R12 summer time", clocks::summer_time),
+        ("killed with two outputs, clock off by less than 1 s", clocked_kills::with_small_errors),
+        ("killed with two outputs, clock leaps", clocked_kills::with_leaps),
         ("R12 clock leaps while armed", armed::clock_leaps),
         ("stopped for 20 s while armed", armed::stopped),
         ("killed while armed", armed::killed),

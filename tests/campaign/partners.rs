@@ -24,7 +24,7 @@ struct Subscriber {
 }
 
 /// Every line that any subscriber has printed.
-type Heard = Arc<Mutex<Vec<String>>>;
+pub(crate) type Heard = Arc<Mutex<Vec<String>>>;
 
 impl Subscriber {
     /// Subscribes, and returns when the broker has said that it is so.
@@ -59,14 +59,14 @@ impl Drop for Subscriber {
 
 /// What has arrived, by number: how often, and at which times of the items.
 #[derive(Default)]
-struct Arrived {
+pub(crate) struct Arrived {
     times: BTreeMap<u64, u64>,
     /// The furthest that a repeated item lay behind the newest then, s of machine time.
     oldest_repeat_s: f64,
 }
 
 impl Arrived {
-    fn of(heard: &Heard) -> Self {
+    pub(crate) fn of(heard: &Heard) -> Self {
         let (mut arrived, mut newest_ns) = (Self::default(), 0);
         for line in heard.lock().expect("whole").iter() {
             let Ok(item) = serde_json::from_str::<Value>(line) else { continue };
@@ -94,7 +94,7 @@ impl Arrived {
         self.times.values().copied().max().unwrap_or(0)
     }
 
-    fn into_row(self, row: &mut Row) {
+    pub(crate) fn into_row(self, row: &mut Row) {
         let (missing, repeats) = (self.missing(), self.repeats());
         row.lost = Some(missing);
         row.repeated = Some((repeats, 0));
@@ -112,15 +112,15 @@ impl Arrived {
 }
 
 /// A box, a broker, a subscriber, and a line between the box and the broker.
-struct Plant {
+pub(crate) struct Plant {
     broker: Broker,
-    heard: Heard,
+    pub(crate) heard: Heard,
     subscriber: Option<Subscriber>,
     line: Line,
 }
 
 impl Plant {
-    fn start() -> Option<Self> {
+    pub(crate) fn start() -> Option<Self> {
         let broker = Broker::with("allow_anonymous true\nmax_inflight_messages 0\nmax_queued_messages 0\n", |_| {})?;
         let heard = Heard::default();
         let subscriber = Some(Subscriber::start(broker.port, &heard)?);
@@ -128,7 +128,7 @@ impl Plant {
         Some(Self { broker, heard, subscriber, line })
     }
 
-    fn address(&self) -> String {
+    pub(crate) fn address(&self) -> String {
         format!("mqtt://127.0.0.1:{}/works/lathe", self.line.port)
     }
 

@@ -10,6 +10,7 @@ pub mod broker;
 pub mod command;
 pub mod host;
 pub mod library;
+pub mod nats_cluster;
 pub mod plain_reading;
 pub mod port;
 pub mod process;

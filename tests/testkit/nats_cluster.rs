@@ -1,11 +1,11 @@
 //! Real NATS servers with JetStream on free ports of this computer; killed when dropped.
 
+use crate::port::free_port;
+use crate::process::wait_for;
 use std::net::TcpStream;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
-use testkit::port::free_port;
-use testkit::process::wait_for;
 
 /// One server of a cluster.
 struct Server {
@@ -16,7 +16,7 @@ struct Server {
 }
 
 /// Servers that know each other.
-pub(crate) struct Cluster {
+pub struct Cluster {
     servers: Vec<Server>,
     _directory: tempfile::TempDir,
 }
@@ -41,7 +41,7 @@ fn program() -> Option<PathBuf> {
 
 impl Cluster {
     /// `count` servers with these further lines in the configuration; `None` where the program is not installed.
-    pub(crate) fn with(count: usize, lines: &str) -> Option<Self> {
+    pub fn with(count: usize, lines: &str) -> Option<Self> {
         program()?;
         let directory = tempfile::tempdir().expect("a directory");
         let routes: Vec<u16> = (0..count).map(|_| free_port()).collect();
@@ -67,12 +67,12 @@ impl Cluster {
     }
 
     /// `count` servers that take everyone, with JetStream.
-    pub(crate) fn start(count: usize) -> Option<Self> {
+    pub fn start(count: usize) -> Option<Self> {
         Self::with(count, "{store}")
     }
 
     /// Starts a server, again after [`Cluster::kill`].
-    pub(crate) fn run(&mut self, index: usize) {
+    pub fn run(&mut self, index: usize) {
         let server = &mut self.servers[index];
         let mut command = Command::new(program().expect("found before"));
         command.arg("-c").arg(&server.config).stdout(Stdio::null()).stderr(Stdio::null());
@@ -82,7 +82,7 @@ impl Cluster {
     }
 
     /// SIGKILL.
-    pub(crate) fn kill(&mut self, index: usize) {
+    pub fn kill(&mut self, index: usize) {
         if let Some(mut child) = self.servers[index].child.take() {
             child.kill().expect("it runs");
             child.wait().expect("it ends");
@@ -90,22 +90,22 @@ impl Cluster {
     }
 
     /// The address of the whole cluster.
-    pub(crate) fn address(&self) -> String {
+    pub fn address(&self) -> String {
         let list: Vec<String> = self.servers.iter().map(|server| format!("127.0.0.1:{}", server.port)).collect();
         format!("nats://{}", list.join(","))
     }
 
     /// The port of the first server.
-    pub(crate) fn port(&self) -> u16 {
+    pub fn port(&self) -> u16 {
         self.servers[0].port
     }
 
     /// What a server says of the stream: its leader's number, and its messages.
-    pub(crate) fn stream(&self) -> Option<(usize, u64)> {
+    pub fn stream(&self) -> Option<(usize, u64)> {
         let alive = self.servers.iter().find(|server| server.child.is_some())?;
         let page = format!("127.0.0.1:{}", alive.monitor);
         TcpStream::connect(&page).ok()?;
-        let answer = testkit::process::get(&page, "/jsz?streams=true");
+        let answer = crate::process::get(&page, "/jsz?streams=true");
         let said: serde_json::Value = serde_json::from_str(&answer.body).ok()?;
         let streams =
             said["account_details"].as_array()?.iter().filter_map(|account| account["stream_detail"].as_array());

@@ -222,6 +222,8 @@ impl Service {
                 let group = format!("-{}", child.id());
                 Command::new("kill").args(["-KILL", "--", &group]).stderr(Stdio::null()).status().expect("kill runs");
                 child.wait().expect("a child");
+                // Nobody may take what was so before for the next start.
+                self.tell("deactivating", 0);
                 let _asked_by_nobody = fs::remove_file(&restart);
                 return;
             }

@@ -2,11 +2,11 @@
 //!
 //! `FLEET_BOXES=100 FLEET_S=60 cargo test --release --test records fleet::boxes -- --ignored --nocapture`
 
-use crate::fleet::cluster::Cluster;
 use crate::fleet::killed::ingest;
 use crate::fleet::postgres::Postgres;
 use std::time::{Duration, Instant};
 use testkit::box_under_test::Sending;
+use testkit::nats_cluster::Cluster;
 use testkit::process::{run, wait_for};
 
 fn setting(name: &str, usual: u64) -> u64 {

@@ -2,10 +2,10 @@
 //!
 //! `FLEET_ROWS=20000 FLEET_KILLS=2 cargo test --test records fleet::killed -- --nocapture`
 
-use crate::fleet::cluster::Cluster;
 use crate::fleet::postgres::Postgres;
 use std::time::{Duration, Instant};
 use testkit::box_under_test::Sending;
+use testkit::nats_cluster::Cluster;
 use testkit::process::{Gateway, program, run, stderr, stdout, wait_for};
 
 const PATIENCE: Duration = Duration::from_secs(240);

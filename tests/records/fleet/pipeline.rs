@@ -1,12 +1,12 @@
 //! Histories that are written here and sent as a box sends them: through the sink `nats://`, the stream and `fleet ingest`.
 
-use crate::fleet::cluster::Cluster;
 use crate::fleet::postgres::Postgres;
 use adapters::{Absence, ChannelId, Sample, Slot, Value};
 use gateway::clock::ClockMark;
 use gateway::history::{ExtraSeries, ExtraValue, Options, Outbox, OutboxSettings, Writer};
 use gateway::sinks::{Board, Sinks, drive};
 use std::time::Duration;
+use testkit::nats_cluster::Cluster;
 use testkit::process::{run, stderr, stdout, wait_for};
 
 /// One stream and one database.

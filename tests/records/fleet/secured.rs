@@ -1,9 +1,9 @@
 //! TLS to a real PostgreSQL: rows arrive over it, and a server that is not the right one gets nothing.
 
-use crate::fleet::cluster::Cluster;
 use crate::fleet::postgres::Postgres;
 use crate::outputs::certificates::Certificates;
 use testkit::box_under_test::Sending;
+use testkit::nats_cluster::Cluster;
 use testkit::process::{run, stderr, stdout};
 
 /// A server that takes nobody over the network without TLS, and the user `cert` only with a client certificate.

@@ -1,6 +1,6 @@
 //! The size of a stream that nobody says, on a server with less room.
 
-use crate::fleet::cluster::Cluster;
+use testkit::nats_cluster::Cluster;
 use testkit::process::{run, stderr, stdout, text};
 
 #[test]

@@ -1,8 +1,8 @@
 //! What is wrong with a NATS server or a database is told in one sentence with the next step.
 
-use crate::fleet::cluster::Cluster;
 use crate::fleet::postgres::Postgres;
 use std::net::TcpListener;
+use testkit::nats_cluster::Cluster;
 use testkit::port::free_port;
 use testkit::process::{run, stderr, stdout};
 
