@@ -31,16 +31,14 @@ pub fn predict_on_probability(scene: &Scene, left: &[f64], levels: TwoLevels) ->
         let mut on = levels.share;
         let mut before: Option<f64> = None;
         for row in run.clone() {
-            if row > run.start {
-                // The chain forgets towards its shares, in proportion to the time that has passed.
-                let kept = (-2.0 * scene.driven_s(row) / levels.dwell_s).exp();
-                on = levels.share + (on - levels.share) * kept;
-            }
-            predicted[row] = on;
+            // The chain forgets towards its shares, in proportion to the time that has passed.
+            let kept = if row > run.start { (-2.0 * scene.driven_s(row) / levels.dwell_s).exp() } else { 0.0 };
+            predicted[row] = levels.share + (on - levels.share) * kept;
             if scene.usable_rows()[row] && left[row].is_finite() {
-                on = learn_from_row(on, before, left[row], levels);
+                on = levels.learn_from_row(on, kept, before, left[row]);
                 before = Some(left[row]);
             } else {
+                on = predicted[row];
                 before = None;
             }
         }
@@ -48,15 +46,24 @@ pub fn predict_on_probability(scene: &Scene, left: &[f64], levels: TwoLevels) ->
     predicted
 }
 
-/// Probability of being on after a row has been seen; the level of the row before counts as the likelier one.
-fn learn_from_row(on: f64, before: Option<f64>, left: f64, levels: TwoLevels) -> f64 {
-    let deviation = levels.deviation.max(f64::MIN_POSITIVE);
-    let was = if on > 0.5 { levels.step } else { 0.0 };
-    let noise = before.map_or(0.0, |before| levels.memory * (before - was));
-    let square = |level: f64| (((left - level - noise) / deviation).clamp(-FARTHEST, FARTHEST)).powi(2);
-    let odds = (0.5 * (square(0.0) - square(levels.step))).exp();
-    let (for_on, for_off) = (on * odds, 1.0 - on);
-    if for_on + for_off > 0.0 { for_on / (for_on + for_off) } else { on }
+impl TwoLevels {
+    /// Probability of being on in a row once it has been seen; `was_on` is that of the row before, whose level the noise of this row
+    /// remembers: both levels then and both levels now are weighed together.
+    fn learn_from_row(&self, was_on: f64, kept: f64, before: Option<f64>, left: f64) -> f64 {
+        let deviation = self.deviation.max(f64::MIN_POSITIVE);
+        let ln = |level: f64, level_before: f64| {
+            let noise = before.map_or(0.0, |before| self.memory * (before - level_before));
+            -0.5 * (((left - level - noise) / deviation).clamp(-FARTHEST, FARTHEST)).powi(2)
+        };
+        let (mut for_on, mut for_off) = (0.0, 0.0);
+        for (chance, level_before) in [(was_on, self.step), (1.0 - was_on, 0.0)] {
+            let stays = f64::from(u8::from(level_before != 0.0));
+            let turns_on = self.share + (stays - self.share) * kept;
+            for_on += chance * turns_on * ln(self.step, level_before).exp();
+            for_off += chance * (1.0 - turns_on) * ln(0.0, level_before).exp();
+        }
+        if for_on + for_off > 0.0 { for_on / (for_on + for_off) } else { self.share + (was_on - self.share) * kept }
+    }
 }
 
 #[cfg(test)]
@@ -94,5 +101,17 @@ mod tests {
     #[test]
     fn later_rows_do_not_change_what_was_predicted() {
         assert_eq!(predict(200, 0.0)[..=150], predict(150, 5000.0)[..=150]);
+    }
+
+    #[test]
+    fn a_wrong_belief_is_left_behind_noise_with_a_memory() {
+        // Believed to be off while it is on: the memory of the noise explains most of the level, row after row.
+        let levels = TwoLevels { step: 100.0, deviation: 40.0, memory: 0.6, dwell_s: 160.0, share: 0.5 };
+        let kept = (-2.0_f64 / 160.0).exp();
+        let mut on = 0.02;
+        for _ in 0..20 {
+            on = levels.learn_from_row(on, kept, Some(100.0), 100.0);
+        }
+        assert!(on > 0.9, "{on}");
     }
 }

@@ -13,7 +13,7 @@ pub struct BearingWarmUp;
 static DOC: EffectDoc = EffectDoc {
     kind: "bearing_warm_up",
     family: "spindle",
-    law: "P = -drop * g * w + initial * g * exp(-t/tau); g = (n / 1000 rpm)^(5/3), of a feed drive (v / 1 m/s)^(5/3), dw/dt = (g - w) / tau; in a force g / v; measured: P = -drop_per_k * g * (T - T0)",
+    law: "P = -drop * g * w + initial * g * exp(-t/tau); g = (n / 1000 rpm)^(5/3), of a feed drive (v / 1 m/s)^(5/3), dw/dt = (g - w) / tau; in a force g / v; measured: P = -drop_per_k * g * f * (1 - exp(-(T - T0) / f)), f = fade_k; without fade_k P = -drop_per_k * g * (T - T0)",
     parameters: &[
         ParameterDoc::new_linear(
             "drop",
@@ -37,9 +37,16 @@ static DOC: EffectDoc = EffectDoc {
             "轴承温度每升高1 K，1000 rpm或1 m/s下的下降量",
         ),
         ParameterDoc::new_shape("tau_s", "s", (60.0, 14400.0), "time constant of warming", "升温时间常数"),
+        ParameterDoc::new_shape(
+            "fade_k",
+            "K",
+            (8.0, 200.0),
+            "warming by which the fall per kelvin becomes 1/e of itself",
+            "每升高1 K的下降量衰减到1/e所需的温升",
+        ),
     ],
     needs: &["speed | velocity"],
-    source: "Palmgren: friction moment grows with (viscosity * n)^(2/3), viscosity falls with temperature (Walther); idle power 10-40 % lower warm",
+    source: "Palmgren: friction moment grows with (viscosity * n)^(2/3), viscosity falls by 3 to 8 % per kelvin (Walther), so that f is 1.5 / 0.03 to 1.5 / 0.08 K; idle power 10-40 % lower warm",
     experiment_minutes: 20.0,
     rivals: &["preload_growth", "zero_drift", "flank_wear", "viscous_friction"],
     en: Texts {
@@ -85,7 +92,10 @@ impl Effect for BearingWarmUp {
         let fast: &[f64] = if velocity.is_some() { &[75.0, 150.0] } else { &[] };
         let mut forms = build_lag_forms(scene, "lag", &[fast, &[300.0, 600.0, 1200.0, 2400.0]].concat());
         let measured = scene.role_values(Role::Temperature).filter(|temperature| has_variation(temperature));
-        forms.extend(measured.map(|_| Form { name: "measured", ..Form::without_shape() }));
+        if measured.is_some() {
+            forms.push(Form { name: "measured", ..Form::without_shape() });
+            forms.extend(FADES_K.map(|fade_k| Form { name: "measured", ..Form::from_shape(&[("fade_k", fade_k)]) }));
+        }
         forms
     }
 
@@ -95,7 +105,11 @@ impl Effect for BearingWarmUp {
         if form.name == "measured" {
             let temperature = scene.role_values(Role::Temperature)?;
             let first = *temperature.first()?;
-            let law = |(g, t): (&f64, &f64)| -g * (t - first);
+            let fall = |warming: f64| match form.shape_value("fade_k") {
+                Some(fade_k) => -fade_k * (-warming / fade_k).exp_m1(),
+                None => warming,
+            };
+            let law = |(g, t): (&f64, &f64)| -g * fall(t - first);
             return Some(vec![("drop_per_k", friction.iter().zip(temperature).map(law).collect())]);
         }
         let tau_s = form.shape_value("tau_s").unwrap_or(900.0);
@@ -126,5 +140,28 @@ fn compute_heat(scene: &Scene, velocity: Option<&[f64]>) -> Option<Vec<f64>> {
     velocity.map(heat).or_else(|| Some(heat(&read_speed_krpm(scene)?)))
 }
 
+/// Fades from which the fit of a measured warm-up begins: those of a grease in the cold and of a thin oil.
+const FADES_K: [f64; 2] = [15.0, 40.0];
 /// Power of friction over speed: torque with the power 2/3.
 const EXPONENT: f64 = 5.0 / 3.0;
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{column, scene, set};
+    use super::*;
+    use recording::Recording;
+
+    #[test]
+    fn a_measured_warm_up_fades_and_begins_as_the_straight_one() {
+        let mut recording = Recording::new("warm", (0..60).map(f64::from).collect(), None);
+        set(&mut recording, "spindle_speed_rpm", |_| 1000.0);
+        set(&mut recording, "bearing_temperature_c", |row| 20.0 + 0.5 * row as f64);
+        set(&mut recording, "spindle_power_w", |_| 500.0);
+        let scene = scene(&recording, "spindle_power_w");
+        let of = |form: Form| column(&BearingWarmUp, &scene, &Form { name: "measured", ..form });
+        let (straight, fading) = (of(Form::without_shape()), of(Form::from_shape(&[("fade_k", 15.0)])));
+        assert!((straight[30] + 15.0).abs() < 1e-9, "1 W/K at 1000 rpm, 15 K warmer: {}", straight[30]);
+        assert!((fading[1] / straight[1] - 1.0).abs() < 0.02, "{} {}", fading[1], straight[1]);
+        assert!((fading[30] + 15.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-9, "{}", fading[30]);
+    }
+}
