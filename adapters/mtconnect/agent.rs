@@ -60,6 +60,8 @@ pub(crate) struct AgentLink {
     endpoint: Endpoint,
     device: Option<String>,
     pub(crate) silence: Duration,
+    /// Does the agent take the name of a device before a request? Some with one device do not.
+    takes_name: bool,
 }
 
 impl AgentLink {
@@ -69,20 +71,27 @@ impl AgentLink {
             endpoint: target.endpoint.clone(),
             device: target.device.clone(),
             silence: Duration::from_millis(target.timeout_ms),
+            takes_name: true,
         }
     }
 
     /// The device, as the agent describes it.
-    pub(crate) fn probe_device(&self) -> Result<Device, SourceError> {
-        let Some(wanted) = &self.device else { return self.find_only_device() };
-        let path = format!("/{}/probe", escape_percent(wanted));
-        match self.probe(&path) {
-            Ok(devices) => match devices.into_iter().find(|device| device.has_name(wanted)) {
-                Some(device) => Ok(device),
-                None => Err(self.build_unknown_device_error(wanted)),
-            },
-            Err(SourceError::Refused { .. }) => Err(self.build_unknown_device_error(wanted)),
-            Err(error) => Err(error),
+    pub(crate) fn probe_device(&mut self) -> Result<Device, SourceError> {
+        self.takes_name = true;
+        let Some(wanted) = self.device.clone() else { return self.find_only_device() };
+        let path = format!("/{}/probe", escape_percent(&wanted));
+        let described = match self.probe(&path) {
+            Err(error) if !matches!(error, SourceError::Refused { .. }) => return Err(error),
+            described => described.unwrap_or_default(),
+        };
+        if let Some(device) = described.into_iter().find(|device| device.has_name(&wanted)) {
+            return Ok(device);
+        }
+        self.takes_name = false;
+        let mut devices = self.probe("/probe")?;
+        match devices.iter().position(|device| device.has_name(&wanted)) {
+            Some(place) => Ok(devices.swap_remove(place)),
+            None => Err(self.build_unknown_device_error(&wanted, &devices)),
         }
     }
 
@@ -102,11 +111,7 @@ impl AgentLink {
         ))
     }
 
-    fn build_unknown_device_error(&self, wanted: &str) -> SourceError {
-        let devices = match self.probe("/probe") {
-            Ok(devices) => devices,
-            Err(error) => return error,
-        };
+    fn build_unknown_device_error(&self, wanted: &str, devices: &[Device]) -> SourceError {
         let names: Vec<&str> =
             devices.iter().filter(|device| !device.is_agent).map(|device| device.name.as_str()).collect();
         let next = match find_nearest_name(wanted, names.iter().copied()) {
@@ -126,7 +131,7 @@ impl AgentLink {
 
     /// What the device says now.
     pub(crate) fn ask_current(&self, device: &Device) -> Result<StreamsDocument, SourceError> {
-        let body = self.ask(&format!("/{}/current", name_in_path(device)))?;
+        let body = self.ask(&format!("{}/current", self.name_in_path(device)))?;
         parse_streams(&body).map_err(|error| self.to_source_error("current", error))
     }
 
@@ -137,7 +142,7 @@ impl AgentLink {
         from: Option<u64>,
         count: u64,
     ) -> Result<StreamsDocument, SourceError> {
-        let body = self.ask(&format!("/{}/sample?{}count={count}", name_in_path(device), format_from(from)))?;
+        let body = self.ask(&format!("{}/sample?{}count={count}", self.name_in_path(device), format_from(from)))?;
         parse_streams(&body).map_err(|error| self.to_source_error("sample", error))
     }
 
@@ -151,11 +156,17 @@ impl AgentLink {
     ) -> Result<Response, SourceError> {
         let interval_ms = saturate_to_ms(interval);
         let query = format!("{}interval={interval_ms}&heartbeat={interval_ms}&count={count}", format_from(from));
-        let path = format!("/{}/sample?{query}", name_in_path(device));
+        let path = format!("{}/sample?{query}", self.name_in_path(device));
         let deadline = Deadline::begin(self.silence);
         let response = send_request(&self.endpoint, &path, deadline);
         let response = response.map_err(|error| self.to_line_error("sample", error))?;
         self.check_status("sample", response, deadline)
+    }
+
+    /// An agent takes the name or the uuid of a device. One that does not answers for all of its devices, whose items have other identifiers.
+    fn name_in_path(&self, device: &Device) -> String {
+        let name = if device.name.is_empty() { &device.uuid } else { &device.name };
+        if self.takes_name { format!("/{}", escape_percent(name)) } else { String::new() }
     }
 
     fn ask(&self, path: &str) -> Result<Vec<u8>, SourceError> {
@@ -224,11 +235,6 @@ impl AgentLink {
 
 fn format_from(from: Option<u64>) -> String {
     from.map_or_else(String::new, |from| format!("from={from}&"))
-}
-
-/// An agent takes the name or the uuid of a device.
-fn name_in_path(device: &Device) -> String {
-    escape_percent(if device.name.is_empty() { &device.uuid } else { &device.name })
 }
 
 fn list_names(names: &[&str]) -> String {

@@ -3,12 +3,16 @@
 use crate::body::BodyDecoder;
 use crate::http::{HttpError, Response, to_error};
 use crate::multipart::{MultipartSplitter, find_boundary};
+use std::collections::VecDeque;
 use std::io::{ErrorKind, Read};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 /// At most so many bytes are taken at one poll: more than an agent sends in one, and little enough that a poll ends.
 const BYTES_MAX: usize = 64 << 20;
+
+/// Of so many parts the usual distance is known.
+const DISTANCES: usize = 9;
 
 /// The way in which a device tells its observations.
 pub(crate) enum Feed {
@@ -28,6 +32,8 @@ pub(crate) struct LiveStream {
     /// Parts that have come.
     pub(crate) parts: u64,
     has_ended: bool,
+    /// Times from part to part, of the last ones.
+    distances: VecDeque<Duration>,
 }
 
 impl LiveStream {
@@ -38,7 +44,16 @@ impl LiveStream {
         stream.set_nonblocking(true).map_err(|error| to_error(&error))?;
         let mut splitter = MultipartSplitter::new(&boundary);
         decoder.decode_into(&rest, splitter.tail()).map_err(|error| HttpError::Nonsense(error.to_string()))?;
-        Ok(Ok(Self { stream, decoder, splitter, last_part: Instant::now(), silence, parts: 0, has_ended: false }))
+        Ok(Ok(Self {
+            stream,
+            decoder,
+            splitter,
+            last_part: Instant::now(),
+            silence,
+            parts: 0,
+            has_ended: false,
+            distances: VecDeque::new(),
+        }))
     }
 
     /// The parts that have come since the last look; does not wait.
@@ -54,6 +69,7 @@ impl LiveStream {
             }
         }
         if !parts.is_empty() {
+            self.note_distance(parts.len());
             self.last_part = Instant::now();
             self.parts += adapter_core::integer::widen_to_u64(parts.len());
             return Ok(parts);
@@ -62,6 +78,21 @@ impl LiveStream {
             return Err(HttpError::Line("the agent ended its answer".to_owned()));
         }
         if self.last_part.elapsed() > self.silence { Err(HttpError::Timeout) } else { Ok(parts) }
+    }
+
+    fn note_distance(&mut self, parts: usize) {
+        let distance = self.last_part.elapsed() / u32::try_from(parts).unwrap_or(u32::MAX);
+        if self.distances.len() >= DISTANCES {
+            self.distances.pop_front();
+        }
+        self.distances.push_back(distance);
+    }
+
+    /// The median time from part to part: an agent may send less often than it was asked to. `None` before there were some.
+    pub(crate) fn find_part_interval(&self) -> Option<Duration> {
+        let mut sorted: Vec<Duration> = self.distances.iter().copied().collect();
+        sorted.sort_unstable();
+        sorted.get(sorted.len() / 2).copied().filter(|_| sorted.len() >= DISTANCES / 2)
     }
 
     fn read_available(&mut self) -> Result<(), HttpError> {

@@ -31,6 +31,10 @@ pub(crate) struct AgentState {
     pub(crate) instead: Option<(&'static str, Vec<u8>)>,
     /// Sends nothing for requests whose path contains this word.
     pub(crate) silent: Option<&'static str>,
+    /// Takes the name of a device before a request?
+    pub(crate) takes_names: bool,
+    /// Sends parts not more often than this.
+    pub(crate) least_interval_ms: u64,
     /// Ends every answer in parts.
     pub(crate) ends_streams: bool,
     pub(crate) requests: Vec<String>,
@@ -133,6 +137,8 @@ impl ScriptedAgent {
             streams: true,
             instead: None,
             silent: None,
+            takes_names: true,
+            least_interval_ms: 0,
             ends_streams: false,
             requests: Vec::new(),
         };
@@ -202,7 +208,7 @@ fn answer(mut stream: TcpStream, state: &Mutex<AgentState>, stopped: &AtomicBool
         )
     };
     if path.contains("probe") {
-        let is_known = device == "probe" || known.devices.contains(&format!("name=\"{device}\""));
+        let is_known = device == "probe" || known.takes_names && known.devices.contains(&format!("name=\"{device}\""));
         let body = if is_known { known.devices.clone() } else { refusal("NO_DEVICE") };
         drop(known);
         return send_document(&mut stream, if is_known { "200 OK" } else { "404 Not Found" }, &body);
@@ -214,7 +220,9 @@ fn answer(mut stream: TcpStream, state: &Mutex<AgentState>, stopped: &AtomicBool
     }
     let (from, count) =
         (find_number(&path, "from").unwrap_or(known.first()), find_number(&path, "count").unwrap_or(100));
-    let interval = find_number(&path, "interval").filter(|_| known.streams);
+    let least_ms = known.least_interval_ms;
+    let interval =
+        find_number(&path, "interval").filter(|_| known.streams).map(|interval_ms| interval_ms.max(least_ms));
     if from < known.first() {
         drop(known);
         return send_document(&mut stream, "404 Not Found", &refusal("OUT_OF_RANGE"));

@@ -192,7 +192,7 @@ mod tests {
             Resume { from: Some(1), gap: None, is_restart: true },
             "what the new start has told is read"
         );
-        assert_eq!(track.resume(&header("2", 1, 0), None).is_restart, true);
+        assert!(track.resume(&header("2", 1, 0), None).is_restart);
     }
 
     #[test]

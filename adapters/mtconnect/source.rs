@@ -58,6 +58,15 @@ struct AgentSession {
     catch_up_to: Option<u64>,
 }
 
+impl AgentSession {
+    fn find_part_interval(&self) -> Option<Duration> {
+        match &self.feed {
+            Feed::Stream(stream) => stream.find_part_interval(),
+            Feed::Questions => None,
+        }
+    }
+}
+
 /// Why a session ends.
 enum SessionEnd {
     /// Ask for the devices and go on at once.
@@ -154,7 +163,13 @@ impl MtConnectSource {
         if self.broken_streams >= BROKEN_STREAMS_MAX {
             return Ok(Feed::Questions);
         }
-        let response = self.link.open_sample(device, self.track.next(), count, self.interval())?;
+        let response = match self.link.open_sample(device, self.track.next(), count, self.interval()) {
+            // An agent that does not know parts, or not so often, answers a plain question.
+            Err(SourceError::Refused { .. }) => {
+                return self.link.ask_sample(device, self.track.next(), count).map(|_| Feed::Questions);
+            }
+            response => response?,
+        };
         let to_error = |error| self.link.to_line_error("sample", error);
         match LiveStream::from_response(response, self.link.silence).map_err(to_error)? {
             Ok(stream) => Ok(Feed::Stream(stream)),
@@ -203,7 +218,9 @@ impl MtConnectSource {
         session.catch_up_to = session.catch_up_to.filter(|target| self.track.next() < Some(*target));
         if is_new && session.catch_up_to.is_none() {
             // Of the part that came last it is known that it was made within the last interval.
-            let half_ns = saturate_to_ns(self.interval()) / 2;
+            let half_ns = saturate_to_ns(
+                session.find_part_interval().map_or(self.interval(), |known| known.max(self.interval())),
+            ) / 2;
             let stamp = Stamp { mid_ns: clock.now_ns().saturating_sub(half_ns), half_width_ns: half_ns };
             self.held.append_all(&self.plan, stamp, out);
         }
@@ -294,6 +311,11 @@ impl Source for MtConnectSource {
 
     fn period(&self) -> Duration {
         Duration::from_millis(self.target.period_ms)
+    }
+
+    fn achievable_period(&self) -> Duration {
+        let known = self.session.as_ref().and_then(AgentSession::find_part_interval);
+        known.map_or(self.period(), |known| known.max(self.period()))
     }
 
     fn query_identity(&self) -> Vec<(&'static str, String)> {

@@ -250,6 +250,32 @@ fn a_wrong_device_gets_the_nearest_name_and_several_are_listed() {
 }
 
 #[test]
+fn agents_that_take_no_name_and_agents_that_send_seldom_are_read_at_their_pace() {
+    let agent = ScriptedAgent::start(TURNING_CENTRE);
+    agent.lock().takes_names = false;
+    agent.lock().least_interval_ms = 150;
+    agent.lock().observe("PathFeedrate", "Fact", "20");
+    let (mut source, mut readings) = (open(&agent), Vec::new());
+    poll_until(&mut source, &mut readings, |source, _| source.achievable_period() > Duration::from_millis(100));
+    assert_eq!(last(&readings, "feed_mm_min"), Some(Ok(Value::Number(1200.0))));
+    assert_eq!(fact(&source, "connections"), 1.0);
+    assert!(agent.lock().requests.iter().any(|path| path.starts_with("/sample?from=")), "{:?}", agent.lock().requests);
+}
+
+#[test]
+fn an_agent_that_refuses_parts_is_asked_at_every_poll() {
+    let agent = ScriptedAgent::start(TURNING_CENTRE);
+    agent.lock().instead = Some(("interval=", b"HTTP/1.1 400 Bad\r\nContent-Length: 0\r\n\r\n".to_vec()));
+    let (mut source, mut readings) = (open(&agent), Vec::new());
+    source.read(&SystemClock::new(), &mut readings).expect("reads");
+    agent.lock().observe("PathFeedrate", "Fact", "20");
+    poll_until(&mut source, &mut readings, |_, readings| {
+        last(readings, "feed_mm_min") == Some(Ok(Value::Number(1200.0)))
+    });
+    assert_eq!(source.query_identity()[4].1, "a question at every poll");
+}
+
+#[test]
 fn bytes_of_every_kind_are_an_error_that_costs_this_source_only() {
     let http = |head: &str, body: &[u8]| [format!("HTTP/1.1 {head}\r\n\r\n").as_bytes(), body].concat();
     let endless = http("200 OK", &[b'<'; 33 << 20]);
