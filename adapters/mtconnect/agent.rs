@@ -12,6 +12,8 @@ use adapter_core::integer::saturate_to_ms;
 use adapter_core::text::shorten_text;
 use std::time::Duration;
 
+/// Most observations of a document. An agent is asked for 4,096, and has as many more as it has data items and standing conditions.
+pub(crate) const OBSERVATIONS_MAX: usize = 100_000;
 /// Names of devices that are told at most.
 const NAMES_SHOWN: usize = 10;
 
@@ -38,6 +40,9 @@ pub(crate) fn parse_streams(document: &[u8]) -> Result<StreamsDocument, Document
     while let Some(event) = reader.read_event().map_err(|error| DocumentError::Nonsense(error.to_string()))? {
         match event {
             StreamsEvent::Header(header) => found.header = header,
+            StreamsEvent::Observation(_) if found.observations.len() >= OBSERVATIONS_MAX => {
+                return Err(DocumentError::Nonsense(format!("it has more than {OBSERVATIONS_MAX} observations")));
+            }
             StreamsEvent::Observation(observation) => found.observations.push(observation),
             StreamsEvent::Error { code, text } => {
                 return Err(DocumentError::Refused { code: shorten_text(code), text: shorten_text(text) });
@@ -62,6 +67,8 @@ pub(crate) struct AgentLink {
     pub(crate) silence: Duration,
     /// Does the agent take the name of a device before a request? Some with one device do not.
     takes_name: bool,
+    /// Of the poll that runs.
+    deadline: Deadline,
 }
 
 impl AgentLink {
@@ -72,7 +79,18 @@ impl AgentLink {
             device: target.device.clone(),
             silence: Duration::from_millis(target.timeout_ms),
             takes_name: true,
+            deadline: Deadline::begin(Duration::from_millis(target.timeout_ms)),
         }
+    }
+
+    /// A poll begins: all of its questions share one deadline.
+    pub(crate) fn begin_poll(&mut self) {
+        self.deadline = Deadline::begin(self.silence);
+    }
+
+    /// The deadline of the poll that runs.
+    pub(crate) fn deadline(&self) -> Deadline {
+        self.deadline
     }
 
     /// The device, as the agent describes it.
@@ -157,7 +175,7 @@ impl AgentLink {
         let interval_ms = saturate_to_ms(interval);
         let query = format!("{}interval={interval_ms}&heartbeat={interval_ms}&count={count}", format_from(from));
         let path = format!("{}/sample?{query}", self.name_in_path(device));
-        let deadline = Deadline::begin(self.silence);
+        let deadline = self.deadline;
         let response = send_request(&self.endpoint, &path, deadline);
         let response = response.map_err(|error| self.to_line_error("sample", error))?;
         self.check_status("sample", response, deadline)
@@ -170,7 +188,7 @@ impl AgentLink {
     }
 
     fn ask(&self, path: &str) -> Result<Vec<u8>, SourceError> {
-        let deadline = Deadline::begin(self.silence);
+        let deadline = self.deadline;
         let request = path.split('?').next().and_then(|path| path.rsplit('/').next()).unwrap_or(path);
         let response =
             send_request(&self.endpoint, path, deadline).map_err(|error| self.to_line_error(request, error))?;

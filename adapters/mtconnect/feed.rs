@@ -11,6 +11,8 @@ use std::time::{Duration, Instant};
 /// At most so many bytes are taken at one poll: more than an agent sends in one, and little enough that a poll ends.
 const BYTES_MAX: usize = 64 << 20;
 
+/// Pause between two looks while a part is waited for.
+const LOOK_EVERY: Duration = Duration::from_millis(2);
 /// Of so many parts the usual distance is known.
 const DISTANCES: usize = 9;
 
@@ -56,17 +58,17 @@ impl LiveStream {
         }))
     }
 
-    /// The parts that have come since the last look; does not wait.
+    /// The parts that have come since the last look. Where there is none it waits for one, at most so long: a poll that comes right behind
+    /// another one has its values too.
     ///
     /// # Errors
     /// The connection has ended and every part was taken, nothing has come for too long, or what comes makes no sense.
-    pub(crate) fn take_parts(&mut self) -> Result<Vec<Vec<u8>>, HttpError> {
-        self.read_available()?;
-        let mut parts = Vec::new();
-        while let Some(part) = self.splitter.next_part().map_err(|error| HttpError::Nonsense(error.to_string()))? {
-            if !part.trim_ascii().is_empty() {
-                parts.push(part);
-            }
+    pub(crate) fn take_parts(&mut self, wait: Duration) -> Result<Vec<Vec<u8>>, HttpError> {
+        let began = Instant::now();
+        let mut parts = self.take_available()?;
+        while parts.is_empty() && !self.has_ended && began.elapsed() < wait {
+            std::thread::sleep(LOOK_EVERY);
+            parts = self.take_available()?;
         }
         if !parts.is_empty() {
             self.note_distance(parts.len());
@@ -93,6 +95,17 @@ impl LiveStream {
         let mut sorted: Vec<Duration> = self.distances.iter().copied().collect();
         sorted.sort_unstable();
         sorted.get(sorted.len() / 2).copied().filter(|_| sorted.len() >= DISTANCES / 2)
+    }
+
+    fn take_available(&mut self) -> Result<Vec<Vec<u8>>, HttpError> {
+        self.read_available()?;
+        let mut parts = Vec::new();
+        while let Some(part) = self.splitter.next_part().map_err(|error| HttpError::Nonsense(error.to_string()))? {
+            if !part.trim_ascii().is_empty() {
+                parts.push(part);
+            }
+        }
+        Ok(parts)
     }
 
     fn read_available(&mut self) -> Result<(), HttpError> {

@@ -58,6 +58,8 @@ pub struct DataItem {
     pub native_scale: Option<f64>,
     /// Is it a plain value, and no set, table or series?
     pub is_value: bool,
+    /// Is it a mean or another figure over some time?
+    pub has_statistic: bool,
     /// `MACHINE` or `WORK`.
     pub coordinate_system: Option<String>,
     /// Kind of the composition that it belongs to: `MOTOR`.
@@ -249,6 +251,7 @@ impl ModelBuilder {
                 .parse_attribute("nativeScale")
                 .filter(|scale: &f64| scale.is_finite() && *scale != 0.0),
             is_value: element.find_attribute("representation").is_none_or(|form| form == "VALUE" || form == "DISCRETE"),
+            has_statistic: element.find_attribute("statistic").is_some(),
             coordinate_system,
             composition,
             component: *component,

@@ -45,7 +45,7 @@ pub(crate) struct ChannelPlan {
     pub(crate) problems: Vec<SourceProblem>,
 }
 
-/// How well an item fits: row, place, subtype and coordinate system, each the less the better.
+/// How well an item fits: row, place, subtype and likeness, each the less the better.
 type Fit = [usize; 4];
 
 struct Candidates {
@@ -253,7 +253,7 @@ fn find_candidates(device: &Device, target: &MtConnectTarget, places: &[Place]) 
         for (row_index, row) in ROWS.iter().enumerate().filter(|(_, row)| row.kind == item.kind) {
             let Some((place_rank, sub_rank)) = rank_item(row, item, places) else { continue };
             let Some(channel) = find_row_channel(row, device, target, places, item.component) else { continue };
-            let fit = [row_index, place_rank, sub_rank, rank_coordinates(item)];
+            let fit = [row_index, place_rank, sub_rank, rank_likeness(item)];
             let entry = found.entry(channel).or_insert(Candidates { fit, form: row.form, items: Vec::new() });
             if fit < entry.fit {
                 *entry = Candidates { fit, form: row.form, items: Vec::new() };
@@ -276,13 +276,15 @@ fn rank_item(row: &Row, item: &DataItem, places: &[Place]) -> Option<(usize, usi
     }
 }
 
-/// Positions of the machine count before those of the work piece, as with other controls.
-fn rank_coordinates(item: &DataItem) -> usize {
-    match item.coordinate_system.as_deref() {
+/// Positions of the machine count before those of the work piece, as with other controls; a value before its mean; the whole component
+/// before a part of it.
+fn rank_likeness(item: &DataItem) -> usize {
+    let coordinates = match item.coordinate_system.as_deref() {
         Some("MACHINE") => 0,
         None => 1,
         Some(_) => 2,
-    }
+    };
+    coordinates + if item.has_statistic { 3 } else { 0 } + if item.composition.is_some() { 6 } else { 0 }
 }
 
 fn find_row_channel(

@@ -12,6 +12,7 @@ pub(crate) const TURNING_CENTRE: &str = r#"<MTConnectDevices xmlns="urn:mtconnec
  <DataItem category="SAMPLE" coordinateSystem="WORK" id="Xwork" type="POSITION" subType="ACTUAL" units="MILLIMETER" nativeUnits="MILLIMETER"/>
  <DataItem category="SAMPLE" coordinateSystem="MACHINE" id="Xabs" type="POSITION" subType="ACTUAL" units="MILLIMETER" nativeUnits="INCH"/>
  <DataItem category="SAMPLE" id="Xfrt" type="AXIS_FEEDRATE" subType="ACTUAL" units="MILLIMETER/SECOND" nativeUnits="MILLIMETER/MINUTE" nativeScale="10"/>
+ <DataItem category="SAMPLE" id="Xmean" type="LOAD" units="PERCENT" statistic="AVERAGE"/>
  <DataItem category="SAMPLE" id="Xload" type="LOAD" units="PERCENT"/><DataItem category="CONDITION" id="Xtravel" type="POSITION"/></DataItems></Linear>
 <Rotary id="c" name="C" nativeName="S"><DataItems>
  <DataItem category="EVENT" id="Srmode" type="ROTARY_MODE"><Constraints><Value>SPINDLE</Value></Constraints></DataItem>

@@ -31,6 +31,8 @@ pub(crate) struct AgentState {
     pub(crate) instead: Option<(&'static str, Vec<u8>)>,
     /// Sends nothing for requests whose path contains this word.
     pub(crate) silent: Option<&'static str>,
+    /// Sends its answers to requests whose path contains this word byte by byte.
+    pub(crate) slow: Option<&'static str>,
     /// Takes the name of a device before a request?
     pub(crate) takes_names: bool,
     /// Sends parts not more often than this.
@@ -137,6 +139,7 @@ impl ScriptedAgent {
             streams: true,
             instead: None,
             silent: None,
+            slow: None,
             takes_names: true,
             least_interval_ms: 0,
             ends_streams: false,
@@ -212,6 +215,14 @@ fn answer(mut stream: TcpStream, state: &Mutex<AgentState>, stopped: &AtomicBool
         let body = if is_known { known.devices.clone() } else { refusal("NO_DEVICE") };
         drop(known);
         return send_document(&mut stream, if is_known { "200 OK" } else { "404 Not Found" }, &body);
+    }
+    if known.slow.is_some_and(|word| path.contains(word)) {
+        drop(known);
+        let _ = stream.write_all(b"HTTP/1.1 200 OK\r\n\r\n");
+        while !stopped.load(Ordering::SeqCst) && stream.write_all(b" ").is_ok() {
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        return;
     }
     if path.contains("current") {
         let body = known.take_current();

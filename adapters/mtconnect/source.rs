@@ -2,7 +2,6 @@
 
 use crate::address::MtConnectTarget;
 use crate::agent::{AgentLink, DocumentError, StreamsDocument, parse_streams};
-use crate::deadline::Deadline;
 use crate::device_clock::{DeviceClock, parse_time};
 use crate::feed::{Feed, LiveStream};
 use crate::held_values::HeldValues;
@@ -105,6 +104,7 @@ impl MtConnectSource {
     }
 
     fn poll(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<(), SourceError> {
+        self.link.begin_poll();
         self.history.expire(clock.now_ns());
         let Some(mut session) = self.session.take() else {
             self.session = Some(self.open_session(clock, out)?);
@@ -175,7 +175,7 @@ impl MtConnectSource {
             Ok(stream) => Ok(Feed::Stream(stream)),
             // An answer in one part says whether the question was understood; its observations are asked for again.
             Err(response) => {
-                let body = response.read_body(Deadline::begin(self.link.silence)).map_err(to_error)?;
+                let body = response.read_body(self.link.deadline()).map_err(to_error)?;
                 parse_streams(&body).map_err(|error| self.link.to_source_error("sample", error))?;
                 Ok(Feed::Questions)
             }
@@ -195,9 +195,10 @@ impl MtConnectSource {
                 return Err(SessionEnd::Reopen);
             }
         }
+        let interval = self.interval();
         let is_new = match &mut session.feed {
             Feed::Stream(stream) => {
-                let parts = stream.take_parts();
+                let parts = stream.take_parts(interval);
                 let so_far = stream.parts;
                 let parts = parts.map_err(|error| self.end_stream(error, so_far))?;
                 if so_far > 1 {
@@ -350,6 +351,7 @@ impl Source for MtConnectSource {
     }
 
     fn list_offers(&mut self, _clock: &dyn Clock) -> Result<Vec<Offer>, SourceError> {
+        self.link.begin_poll();
         let device = self.link.probe_device()?;
         let current = self.link.ask_current(&device)?;
         let plan = ChannelPlan::from_device(&device, &self.target);

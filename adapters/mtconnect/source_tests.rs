@@ -315,6 +315,29 @@ fn bytes_of_every_kind_are_an_error_that_costs_this_source_only() {
 }
 
 #[test]
+fn an_agent_that_sends_slowly_costs_a_poll_no_more_than_its_deadline() {
+    let agent = ScriptedAgent::start(TURNING_CENTRE);
+    agent.lock().slow = Some("current");
+    let (mut source, began) = (open(&agent), Instant::now());
+    assert!(matches!(read_error(&mut source), SourceError::Timeout { .. }));
+    let took = began.elapsed();
+    assert!(
+        (Duration::from_millis(1500)..Duration::from_millis(2500)).contains(&took),
+        "four times the silence: {took:?}"
+    );
+}
+
+#[test]
+fn a_document_of_a_million_observations_is_refused() {
+    let one = "<Load dataItemId=\"x\" timestamp=\"t\" sequence=\"1\"/>";
+    let body = format!("<MTConnectStreams>{}</MTConnectStreams>", one.repeat(100_001));
+    let agent = ScriptedAgent::start(TURNING_CENTRE);
+    agent.lock().instead = Some(("current", format!("HTTP/1.1 200 OK\r\n\r\n{body}").into_bytes()));
+    let told = read_error(&mut open(&agent)).to_string();
+    assert!(told.contains("more than 100000 observations"), "{told}");
+}
+
+#[test]
 fn a_silent_agent_is_a_timeout_and_one_that_is_not_there_a_broken_line() {
     let agent = ScriptedAgent::start(TURNING_CENTRE);
     let (mut source, mut readings) = (open(&agent), Vec::new());

@@ -230,7 +230,7 @@ fn every_observation_comes_once_through_restarts_and_a_gap_is_told() {
 }
 
 #[test]
-#[ignore = "a campaign of a minute: 60,000 observations and 10 restarts"]
+#[ignore = "a campaign of ten seconds: 60,000 observations and 10 restarts"]
 fn sixty_thousand_observations_come_once_through_ten_restarts() {
     assert!(agent_is_there(), "pip install mtconnect==0.3.3");
     read_all_once(60_000, 10);
