@@ -7,9 +7,10 @@
 //! | crate | what | uses |
 //! |---|---|---|
 //! | [`adapter_core`] | channels, readings, merging, what every driver needs | |
-//! | [`recording`](mod@recording) | recordings in every format that is read | `adapter_core` |
+//! | [`recording`](mod@recording) | recordings in every format that is read | `adapter_core`, `mtconnect` |
 //! | [`simulated`] | the built-in machine | `adapter_core` |
 //! | [`mqtt`] | a client of MQTT | `adapter_core` |
+//! | [`mtconnect`] | controls behind an MTConnect agent | `adapter_core` |
 //! | [`modbus`] | meters by Modbus | `adapter_core` |
 //! | [`modbus_server`] | the simulated machine as a meter | `modbus`, `simulated` |
 //! | [`fanuc`] | FANUC controllers, natively and through the vendor's library | `adapter_core` |
@@ -44,6 +45,7 @@ pub use hnc;
 pub use modbus;
 pub use modbus_server;
 pub use mqtt;
+pub use mtconnect;
 pub use nclink;
 pub use nclink_device;
 pub use recording;

@@ -1,10 +1,13 @@
 //! From an address to something that can be read.
 
-use crate::address::{Address, FanucBackend, ReplayTarget, SimulatedDevice, SimulatedTarget, Speed, Target};
+use crate::address::{
+    Address, FanucBackend, MtConnectTarget, ReplayTarget, SimulatedDevice, SimulatedTarget, Speed, Target,
+};
 use crate::clock::TimeNs;
 use crate::driver::{Actuator, Pull, Source};
 use crate::eda9033a::Eda9033a;
 use crate::modbus::ModbusMeter;
+use crate::mtconnect::MtConnectSource;
 use crate::offset::OffsetSink;
 use crate::recording::{RecordingError, RowProblem, read_path};
 use crate::replay::{LiveReplay, Replay};
@@ -114,6 +117,7 @@ pub fn open_address(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenErr
         }
         Target::NcLink(target) => Ok(crate::nclink::open_address(address.text(), target)?.into()),
         Target::HncNet(target) => Ok(crate::hnc::open_address(address.text(), target).into()),
+        Target::MtConnect(target) => Ok(open_agent(address, target)),
         Target::ModbusTcp { at, meter } => read_only(address, ModbusMeter::with_tcp_line(address.text(), at, meter)),
         Target::ModbusRtu { line, meter } => {
             read_only(address, ModbusMeter::with_rtu_line(address.text(), line, meter))
@@ -122,6 +126,12 @@ pub fn open_address(address: &Address, now_ns: TimeNs) -> Result<Opened, OpenErr
         Target::Temperature { file, sys } => read_only(address, Temperatures::open(address.text(), file, sys)),
         other => Err(not_built(address, other)),
     }
+}
+
+/// A device behind an agent, which is connected to at the first poll.
+fn open_agent(address: &Address, target: &MtConnectTarget) -> Opened {
+    let sources: Vec<Box<dyn Source>> = vec![Box::new(MtConnectSource::new(address.text(), target))];
+    OpenedDevice { sources, actuator: None, offsets: None }.into()
 }
 
 /// A device that is read and never written.

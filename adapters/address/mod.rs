@@ -8,6 +8,7 @@ pub use eda9033a::EdaTarget;
 pub use fanuc::address::{FanucBackend, FanucOptions, WriteMethod};
 pub use hnc::address::{HncNetTarget, HncOffset};
 pub use modbus::address::MeterTarget;
+pub use mtconnect::address::MtConnectTarget;
 pub use nclink::address::NcLinkTarget;
 pub use simulated::address::{SimulatedDay, SimulatedDevice, SimulatedMachine, SimulatedTarget};
 pub use target::{ReplayTarget, Target};
@@ -17,13 +18,14 @@ use std::fmt;
 use std::str::FromStr;
 
 /// The schemes of the notation, for "did you mean" and for help texts.
-pub const SCHEMES: [&str; 11] = [
+pub const SCHEMES: [&str; 12] = [
     "simulated",
     "replay",
     "fanuc",
     "nclink",
     "nclinks",
     "hncnet",
+    "mtconnect",
     "modbus-tcp",
     "modbus-rtu",
     "eda9033a",
@@ -62,6 +64,8 @@ impl Address {
             }
             // What stands where in a model differs between makers: here every channel can be told its place.
             Target::NcLink(target) => target.own = Own::declare_all(own, &[])?,
+            // What a device calls its data items differs between adapters, too.
+            Target::MtConnect(target) => target.own = Own::declare_all(own, &[])?,
             Target::HncNet(target) => target.own = Own::declare_all(own, &crate::hnc::delivered())?,
             Target::ModbusTcp { meter, .. } | Target::ModbusRtu { meter, .. } => {
                 meter.own = Own::declare_all(own, &[])?
@@ -106,7 +110,8 @@ impl FromStr for Address {
 }
 
 /// Ports of devices, with the scheme that they speak.
-const PORTS: [(u16, &str); 4] = [(8193, "fanuc"), (10001, "hncnet"), (502, "modbus-tcp"), (1883, "nclink")];
+const PORTS: [(u16, &str); 5] =
+    [(8193, "fanuc"), (10001, "hncnet"), (502, "modbus-tcp"), (1883, "nclink"), (5000, "mtconnect")];
 
 /// A host with or without a port, as on the network page of a control: the address that is meant. `None` for what has a scheme.
 fn guess_scheme(text: &str) -> Option<String> {
@@ -183,6 +188,8 @@ mod tests {
             "nclink://broker/SN1?write=mailbox&offset=D110",
             "hncnet://cnc?library=x.so&offset=W40",
             "hncnet://cnc?library=x.so&offset=zero&offset_unit_um=0.01",
+            "mtconnect://10.0.0.8:5000/Mazak01",
+            "mtconnect://agent?period_ms=500&timeout_ms=3000&spindle=S1&paths=1,2",
             "modbus-tcp://[::1]:502?unit=1&profile=sdm630",
             "modbus-rtu:///dev/ttyUSB0?baud=9600&parity=none&unit=1&profile=eda9033a",
             "eda9033a:///dev/ttyUSB0?baud=9600&address=1&ct=20",
@@ -217,6 +224,7 @@ mod tests {
             ("192.168.1.10:8193", "write fanuc://192.168.1.10:8193"),
             ("cnc.shop:8193", "write fanuc://cnc.shop:8193"),
             ("[::1]:8193", "write fanuc://[::1]:8193"),
+            ("192.168.1.30:5000", "write mtconnect://192.168.1.30:5000"),
             ("192.168.1.20:502", "write modbus-tcp://192.168.1.20:502?profile=sdm630"),
             ("192.168.1.10", "fanuc://192.168.1.10:8193"),
             ("192.168.1.10:7000", "fanuc://192.168.1.10:7000"),

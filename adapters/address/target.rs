@@ -10,6 +10,7 @@ use adapter_core::channel::find_nearest_name;
 use fanuc::address::{FanucBackend, FanucOptions, FanucTarget, parse_fanuc};
 use hnc::address::{HncNetTarget, parse_hncnet};
 use modbus::address::{MeterTarget, NoProfile, parse_framing, parse_modbus};
+use mtconnect::address::{MtConnectTarget, parse_mtconnect};
 use nclink::address::{NcLinkAddressError, NcLinkTarget, parse_nclink};
 use simulated::address::{NoSuchMachine, SimulatedTarget, parse_simulated};
 use std::path::PathBuf;
@@ -44,6 +45,8 @@ pub enum Target {
     },
     /// A Huazhong controller by NC-Link over MQTT.
     NcLink(NcLinkTarget),
+    /// A control behind an MTConnect agent.
+    MtConnect(MtConnectTarget),
     /// A Huazhong controller through its vendor library.
     HncNet(HncNetTarget),
     /// A Modbus device on the network.
@@ -121,6 +124,7 @@ pub(super) fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<Target,
         "nclink" => Ok(Target::NcLink(parse_nclink(body, keys, false)?)),
         "nclinks" => Ok(Target::NcLink(parse_nclink(body, keys, true)?)),
         "hncnet" => Ok(Target::HncNet(parse_hncnet(body, keys)?)),
+        "mtconnect" => Ok(Target::MtConnect(parse_mtconnect(body, keys)?)),
         "modbus-tcp" => {
             let (meter, framing) = (parse_modbus(keys, 0), parse_framing(keys));
             let meter = meter.map(|meter| MeterTarget { framing, ..meter });

@@ -11,6 +11,7 @@ pub mod clock;
 pub mod conversion;
 pub mod driver;
 pub mod electric;
+pub mod energy_count;
 pub mod histogram;
 pub mod integer;
 pub mod merge;

@@ -6,6 +6,7 @@
 //! | `fanuc://` | `macro 500`, `pmc D20 word`, `diagnosis 301 axis 1`, `pmc D100 text 20`, ... | `fanuc::OwnItem` |
 //! | `nclink://` | `AXIS@5/MOTOR/TEMPERATURE`, `CONTROLLER/VARIABLE@REG_D 120` | `nclink::OwnPath` |
 //! | `hncnet://` | `register D120`, `channel 7 real`, `axis 5 29 real` | `hnc::OwnValue` |
+//! | `mtconnect://` | `Xload` | `mtconnect::OwnDataItem` |
 //! | `modbus-tcp://`, `modbus-rtu://` | `input 52 f32`, `holding 0x34 i16` | `modbus::OwnRegister` |
 //!
 //! A name of the table of channels may be given to what a source has and does not deliver by itself; it keeps the unit and the

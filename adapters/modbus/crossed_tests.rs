@@ -1,6 +1,7 @@
 //! Every profile on the register map of every other one, and meters that refuse for a while. A power is right or absent.
 
 use super::line::{ModbusError, ModbusLine, ModbusResponse};
+use super::number::Format;
 use super::outputs::{self, MeterChannel};
 use super::pdu;
 use super::plan::PollBlocks;
@@ -10,6 +11,7 @@ use super::register::{MeterRegister, RegisterMeaning};
 use adapter_core::address::Circuit;
 use adapter_core::clock::{Clock, ManualClock, SECOND_NS};
 use adapter_core::electric::SupplyCheck;
+use adapter_core::energy_count::{CounterEvent, EnergyCount};
 use adapter_core::reading::{Absence, Stamp};
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -83,6 +85,7 @@ impl ModbusLine for Image {
 }
 
 struct Reader {
+    count: Option<EnergyCount>,
     profile: Profile,
     registers: Vec<MeterRegister>,
     outputs: Vec<MeterChannel>,
@@ -94,6 +97,7 @@ impl Reader {
     fn new(profile: &Profile) -> Self {
         let blocks = PollBlocks::from_registers(&profile.registers, profile.block_max, profile.block_gap);
         Self {
+            count: outputs::find_energy_count(&profile.registers),
             profile: profile.clone(),
             registers: profile.registers.clone(),
             outputs: outputs::list_channels(profile, Circuit::Machine).expect("channels"),
@@ -108,8 +112,9 @@ impl Reader {
             return Vec::new();
         }
         let doubts = outputs::judge_answer(&mut self.check, &self.profile, &self.registers, &self.poll);
+        let (registers, poll, count) = (&self.registers, &self.poll, &mut self.count);
         let read = |output: &MeterChannel| {
-            let value = output.build_reading(&self.registers, &self.poll, &doubts).value;
+            let value = output.build_counted_reading(registers, poll, &doubts, count.as_mut()).value;
             let value = value.map(|value| value.as_number().unwrap_or(f64::NAN));
             ChannelResult { name: output.channel.name(), value }
         };
@@ -216,4 +221,124 @@ fn what_a_meter_refuses_while_it_starts_is_asked_for_again() {
             _ => assert!(power.is_ok_and(|power| (power - TOTAL_W).abs() < 1.0), "{second} s: {power:?}"),
         }
     }
+}
+
+/// Every profile with an energy register, and one for each further form of a counter.
+fn list_counting_profiles() -> Vec<Profile> {
+    let shipped = SHIPPED.iter().map(|(name, _)| find_profile(name, None).unwrap_or_else(|error| panic!("{error}")));
+    let is_energy = |register: &MeterRegister| register.meaning == RegisterMeaning::Energy;
+    let mut counting: Vec<Profile> = shipped.filter(|profile| profile.registers.iter().any(is_energy)).collect();
+    let first = counting[0].clone();
+    for format in [Format::U16, Format::Sm16, Format::Sm32, Format::U32, Format::F64] {
+        let mut own = first.clone();
+        own.name = format!("{} with {format:?}", first.name);
+        let register = own.registers.iter_mut().find(|register| is_energy(register)).expect("energy");
+        (register.format, register.conversion.scale) = (format, 0.1);
+        counting.push(own);
+    }
+    counting
+}
+
+/// What the counter of a meter shows at one second: a count, or what stands there instead.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum ShownCount {
+    Count(f64),
+    Zero,
+    BelowZero,
+}
+
+#[test]
+fn every_counter_of_energy_is_right_or_absent_through_rollover_reset_zero_and_underflow() {
+    let (mut right, mut absent, mut wrong, mut profiles) = (0, 0, Vec::new(), 0);
+    for profile in list_counting_profiles() {
+        profiles += 1;
+        let register =
+            profile.registers.iter().find(|register| register.meaning == RegisterMeaning::Energy).expect("energy");
+        let bits = register.format.find_counter_bits();
+        let step_kwh = register.conversion.scale;
+        // Counts that never lie at the end of a register of 2^15 steps, and a single step of a counter every second.
+        let tick_kwh = step_kwh.clamp(0.01, 0.1);
+        let mut line = Image::from_profile(&profile, true);
+        let (mut reader, clock) = (Reader::new(&profile), ManualClock::with_time(0));
+        let (mut true_kwh, mut consumed_kwh) = (1000.0 * tick_kwh + 50.0, 0.0);
+        for second in 0_i64..200 {
+            clock.set_time(second * SECOND_NS);
+            if second > 0 {
+                (true_kwh, consumed_kwh) = (true_kwh + tick_kwh, consumed_kwh + tick_kwh);
+            }
+            if second == 120 {
+                // Somebody resets the meter.
+                true_kwh = tick_kwh;
+            }
+            let shown = match second {
+                30 | 60 => ShownCount::Zero,
+                80..90 if bits.is_some_and(|(_, is_unsigned)| is_unsigned) => ShownCount::BelowZero,
+                _ => ShownCount::Count(true_kwh),
+            };
+            let raw = match shown {
+                ShownCount::Count(kwh) => kwh / step_kwh,
+                ShownCount::Zero => 0.0,
+                ShownCount::BelowZero => 2_f64.powi(bits.expect("a whole number").0) - 3.0,
+            };
+            line.registers.extend((register.address..).zip(register.format.encode(raw, register.order)));
+            let all = reader.read_all(&mut line, &clock);
+            let value = all.into_iter().find(|one| one.name == "total_energy_kwh").expect("a channel").value;
+            match value {
+                Ok(kwh) if (kwh - true_kwh).abs() <= step_kwh.max(0.01) => right += 1,
+                Ok(kwh) => wrong.push(format!("{} at {second} s: {kwh} kWh for {true_kwh}", profile.name)),
+                Err(_) => absent += 1,
+            }
+        }
+        let count = reader.count.expect("a counter");
+        let told = |event| count.count_events(event);
+        let underflows = u32::from(bits.is_some_and(|(_, is_unsigned)| is_unsigned));
+        let found = (told(CounterEvent::Zero), told(CounterEvent::Reset), told(CounterEvent::BelowZero));
+        assert_eq!(found, (2, 1, underflows), "{}", profile.name);
+        assert!(
+            (count.consumed_kwh() - consumed_kwh).abs() <= 3.0 * tick_kwh.max(step_kwh),
+            "{}: {} of {consumed_kwh} kWh",
+            profile.name,
+            count.consumed_kwh()
+        );
+    }
+    println!("{profiles} profiles: {right} right, {absent} absent, {} wrong", wrong.len());
+    assert_eq!(wrong, Vec::<String>::new(), "{right} right, {absent} absent");
+    assert!(profiles >= 15 && right >= 180 * profiles, "{right} right, {absent} absent");
+}
+
+#[test]
+fn every_counter_with_a_sign_goes_over_the_end_of_its_register() {
+    let (mut right, mut absent, mut profiles) = (0, 0, 0);
+    for profile in list_counting_profiles() {
+        let register =
+            profile.registers.iter().find(|register| register.meaning == RegisterMeaning::Energy).expect("energy");
+        let Some((bits @ 1..=31, false)) = register.format.find_counter_bits() else { continue };
+        profiles += 1;
+        let step_kwh = register.conversion.scale;
+        let mut line = Image::from_profile(&profile, true);
+        let (mut reader, clock) = (Reader::new(&profile), ManualClock::with_time(0));
+        for second in 0_i32..40 {
+            clock.set_time(i64::from(second) * SECOND_NS);
+            let raw = (2_f64.powi(bits) - 20.0 + f64::from(second)) % 2_f64.powi(bits);
+            line.registers.extend((register.address..).zip(register.format.encode(raw, register.order)));
+            let all = reader.read_all(&mut line, &clock);
+            match all.into_iter().find(|one| one.name == "total_energy_kwh").expect("a channel").value {
+                Ok(kwh) => {
+                    assert!((kwh - raw * step_kwh).abs() < 1e-3, "{} at {second} s: {kwh} kWh", profile.name);
+                    right += 1;
+                }
+                Err(_) => absent += 1,
+            }
+        }
+        let count = reader.count.expect("a counter");
+        assert_eq!(count.count_events(CounterEvent::Rollover), 1, "{}", profile.name);
+        assert!(
+            (count.consumed_kwh() - 39.0 * step_kwh).abs() < 1e-3,
+            "{}: {} kWh",
+            profile.name,
+            count.consumed_kwh()
+        );
+    }
+    println!("{profiles} profiles: {right} right, {absent} absent");
+    assert!(profiles >= 6 && absent <= profiles, "{right} right, {absent} absent");
 }

@@ -17,6 +17,7 @@ use adapter_core::channel::ChannelId;
 use adapter_core::clock::Clock;
 use adapter_core::driver::{Fact, Offer, Source, SourceError, SourceProblem};
 use adapter_core::electric::{Doubts, SupplyCheck};
+use adapter_core::energy_count::EnergyCount;
 use adapter_core::integer::count_to_f64;
 use adapter_core::own::Own;
 use adapter_core::reading::{Absence, Reading};
@@ -42,6 +43,7 @@ pub struct ModbusMeter {
     refresh: Refresh,
     check: SupplyCheck,
     doubts: Doubts,
+    count: Option<EnergyCount>,
 }
 
 impl ModbusMeter {
@@ -72,6 +74,7 @@ impl ModbusMeter {
         let profile = profile::find_profile(&meter.profile, meter.profiles.as_deref())?;
         let mut registers = outputs::list_registers(&profile, meter)?;
         let outputs = outputs::list_channels(&profile, meter.circuit)?;
+        let count = outputs::find_energy_count(&registers);
         let mut own = Vec::new();
         for channel in &meter.own {
             let from = registers.len();
@@ -96,6 +99,7 @@ impl ModbusMeter {
             refresh: Refresh::default(),
             check: SupplyCheck::default(),
             doubts: Doubts::default(),
+            count,
         })
     }
 
@@ -196,7 +200,10 @@ impl Source for ModbusMeter {
         let (all, stamp) = self.poll.list_all_registers();
         self.refresh.push(all, stamp.mid_ns);
         self.doubts = outputs::judge_answer(&mut self.check, &self.profile, &self.registers, &self.poll);
-        out.extend(self.outputs.iter().map(|output| output.build_reading(&self.registers, &self.poll, &self.doubts)));
+        for output in &self.outputs {
+            let count = self.count.as_mut();
+            out.push(output.build_counted_reading(&self.registers, &self.poll, &self.doubts, count));
+        }
         out.extend(self.own.iter().map(|(own, places)| self.own_reading(own, places)));
         Ok(())
     }
@@ -227,11 +234,13 @@ impl Source for ModbusMeter {
         #[expect(clippy::cast_precision_loss, reason = "a count of late answers stays far below 2^53")]
         facts.push(Fact::from_number("late_answers", self.line.late_answers() as f64));
         facts.extend(self.profile.registers.iter().filter_map(point_name));
+        facts.extend(self.count.iter().flat_map(EnergyCount::collect_facts));
         facts
     }
 
     fn list_problems(&self) -> Vec<SourceProblem> {
-        self.doubts.problems.iter().cloned().chain(self.describe_missing()).collect()
+        let count = self.count.as_ref().and_then(EnergyCount::find_problem);
+        self.doubts.problems.iter().cloned().chain(self.describe_missing()).chain(count).collect()
     }
 
     fn list_offers(&mut self, clock: &dyn Clock) -> Result<Vec<Offer>, SourceError> {

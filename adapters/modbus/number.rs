@@ -81,6 +81,18 @@ impl Format {
         }
     }
 
+    /// Bits of a whole number without its sign, and whether it has none: what a counter can hold.
+    pub(super) fn find_counter_bits(self) -> Option<(i32, bool)> {
+        match self {
+            Self::U16 => Some((16, true)),
+            Self::U32 => Some((32, true)),
+            Self::I16 | Self::Sm16 => Some((15, false)),
+            Self::I32 | Self::Sm32 => Some((31, false)),
+            Self::I64 => Some((63, false)),
+            Self::F32 | Self::F64 => None,
+        }
+    }
+
     /// The format of this name, as a profile writes it.
     #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {

@@ -9,8 +9,9 @@ use adapter_core::address::Circuit;
 use adapter_core::channel::ChannelId;
 use adapter_core::driver::SourceProblem;
 use adapter_core::electric::{Doubts, SupplyCheck, SupplyValues};
+use adapter_core::energy_count::{CounterForm, EnergyCount};
 use adapter_core::integer::count_to_f64;
-use adapter_core::reading::Reading;
+use adapter_core::reading::{Reading, Value};
 
 /// How the registers of an output are put together.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,7 +74,43 @@ impl Believed {
     }
 }
 
+/// Share of a number by which neighbours of single precision lie apart.
+const SINGLE_PRECISION: f64 = 1.2e-7;
+
+/// The counter of a profile, where it has one.
+pub(super) fn find_energy_count(registers: &[MeterRegister]) -> Option<EnergyCount> {
+    let register = registers.iter().find(|register| register.meaning == RegisterMeaning::Energy)?;
+    let step_kwh = register.conversion.scale.abs();
+    let form = match register.format.find_counter_bits() {
+        Some((bits, is_unsigned)) => {
+            CounterForm { wraps_at_kwh: Some(2_f64.powi(bits) * step_kwh), is_unsigned, resolution: (0.0, step_kwh) }
+        }
+        None => {
+            CounterForm { wraps_at_kwh: None, is_unsigned: false, resolution: (SINGLE_PRECISION, step_kwh.min(0.01)) }
+        }
+    };
+    Some(EnergyCount::new(form))
+}
+
 impl MeterChannel {
+    /// The same, where a counter of energy is also held against its last count.
+    pub(super) fn build_counted_reading(
+        &self,
+        registers: &[MeterRegister],
+        poll: &RegisterPoll,
+        doubts: &Doubts,
+        count: Option<&mut EnergyCount>,
+    ) -> Reading {
+        let reading = self.build_reading(registers, poll, doubts);
+        let counted = count.filter(|_| self.believed == Believed::AsEnergy);
+        let number = reading.value.as_ref().ok().and_then(Value::as_number);
+        let is_believed = counted.zip(number).map(|(count, number)| count.judge_count(reading.stamp.mid_ns, number));
+        match (is_believed, number) {
+            (Some(false), Some(number)) => Reading::from_implausible(self.channel, reading.stamp, number),
+            _ => reading,
+        }
+    }
+
     /// What the last poll says of it.
     pub(super) fn build_reading(&self, registers: &[MeterRegister], poll: &RegisterPoll, doubts: &Doubts) -> Reading {
         let mut numbers = Vec::with_capacity(3);

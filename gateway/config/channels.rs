@@ -158,6 +158,7 @@ mod tests {
         let cases = [
             ("nclink://b/S", "AXIS@5/MOTOR/TEMPERATURE", "AXIS@5 MOTOR TEMPERATURE", "doctor --all"),
             ("hncnet://cnc?library=x.so", "register D120", "macro 500", "register D120"),
+            ("mtconnect://agent/M", "Xload", "X load", "doctor --all"),
             ("modbus-tcp://m?profile=sdm630", "input 70 f32", "macro 500", "input 52 f32"),
             ("fanuc://cnc", "macro 500", "input 70 f32", "macro 500"),
         ];

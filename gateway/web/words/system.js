@@ -64,6 +64,7 @@ export const SYSTEM = {
   add_device: ["Add it", "添加"],
   device_fanuc: ["FANUC control", "FANUC 数控系统"],
   device_nclink: ["Huazhong control, NC-Link", "华中数控 NC-Link"],
+  device_mtconnect: ["Control behind an MTConnect agent", "MTConnect 代理之后的数控系统"],
   device_modbus_tcp: ["Meter, Modbus TCP", "电能表 Modbus TCP"],
   device_modbus_rtu: ["Meter, Modbus RTU", "电能表 Modbus RTU"],
   device_simulated: ["Simulated machine", "模拟机床"],

@@ -49,6 +49,7 @@ pub(crate) fn all() -> Vec<Parser> {
         parser("matlab", || foreign(&["mat"]), |bytes| recording(bytes, "mat")),
         parser("labview", || foreign(&["tdms", "lvm"]), |bytes| recording(bytes, "tdms")),
         parser("mtconnect", || foreign(&["xml"]), |bytes| recording(bytes, "xml")),
+        parser("mtconnect-agent", mtconnect_documents, mtconnect_document),
         parser("parquet", || foreign(&["parquet"]), |bytes| recording(bytes, "parquet")),
         parser("map", maps, |bytes| drop(Mapping::parse(&text(bytes), "own.map.toml"))),
         parser(
@@ -212,6 +213,18 @@ fn nclink(bytes: &[u8]) {
     drop(SampleBlock::parse(&message, "0102", &model));
 }
 
+fn mtconnect_documents() -> Vec<Vec<u8>> {
+    let mut all = files("tests/controllers/mtconnect", "xml");
+    all.extend(foreign(&["xml"]));
+    all
+}
+
+fn mtconnect_document(bytes: &[u8]) {
+    drop(adapters::mtconnect::model::parse_devices(bytes));
+    let mut reader = adapters::mtconnect::streams::StreamsReader::new(bytes);
+    while let Ok(Some(_)) = reader.read_event() {}
+}
+
 fn waveform_headers() -> Vec<Vec<u8>> {
     let currents = WaveformHeader::with_currents(12_800.0, &["r", "s", "t"], 40.0, 32_000);
     [currents.encode_line(), WaveformHeader::with_amplitude(200.0, 40.0, 32_000).encode_line()]
@@ -248,6 +261,7 @@ fn addresses() -> Vec<Vec<u8>> {
         "simulated://lathe?seed=7",
         "modbus-tcp://10.0.0.6:502?unit=1&profile=sdm630",
         "nclink://10.0.0.7:1883/00FFA?user=a&offset=5",
+        "mtconnect://10.0.0.8:5000/Lathe?period_ms=500&spindle=S1",
         "eda9033a:///dev/ttyUSB0?unit=3",
         "mqtts://broker:8883/works/lathe?ca=ca.pem&protocol=5",
         "sparkplug://[fe80::1]:1883/plant/line/lathe?host=scada",

@@ -7,38 +7,11 @@ use super::super::input::Input;
 use super::super::limits::{CELLS_IN_MEMORY_MAX, COLUMNS_MAX};
 use super::super::table::{ColumnCells, ColumnTable, OwnedCell};
 use adapter_core::bilingual::Bilingual;
-use quick_xml::Reader;
-use quick_xml::events::{BytesStart, Event};
+use mtconnect::standard::find_type;
+use mtconnect::streams::{Observation, StreamsEvent, StreamsReader, UNAVAILABLE};
 use std::collections::HashMap;
 use std::io::BufReader;
 
-/// Element, the words of our dictionary for it, the unit of the standard.
-const TYPES: &[(&str, &str, &str)] = &[
-    ("RotaryVelocity", "Spindle speed", "rpm"),
-    ("SpindleSpeed", "Spindle speed", "rpm"),
-    ("PathFeedrate", "Path feedrate", "mm/s"),
-    ("AxisFeedrate", "Axis velocity", "mm/s"),
-    ("PathFeedratePerRevolution", "Feed per revolution", "mm/rev"),
-    ("Wattage", "Power", "W"),
-    ("Amperage", "Current", "A"),
-    ("AmperageAC", "Current", "A"),
-    ("Voltage", "Voltage", "V"),
-    ("VoltageAC", "Voltage", "V"),
-    ("Load", "Load", "%"),
-    ("Torque", "Torque", "N m"),
-    ("Temperature", "Temperature", "°C"),
-    ("Position", "Position", "mm"),
-    ("Displacement", "Displacement", "mm"),
-    ("LinearForce", "Force", "N"),
-    ("RotaryVelocityOverride", "Spindle override", "%"),
-    ("PathFeedrateOverride", "Feed override", "%"),
-    ("Program", "program", ""),
-    ("Block", "block", ""),
-    ("ControllerMode", "mode", ""),
-    ("Execution", "execution", ""),
-    ("ToolNumber", "tool", ""),
-    ("ToolId", "tool", ""),
-];
 /// Components that turn the spindle.
 const SPINDLES: [&str; 2] = ["Spindle", "Rotary"];
 
@@ -53,32 +26,24 @@ struct Item {
 struct Stream {
     items: Vec<Item>,
     known: HashMap<String, usize>,
-    component: (String, String),
-    /// The observation whose text comes next: its item and time.
-    open: Option<(usize, String)>,
     cells: usize,
-    is_streams: bool,
 }
 
 pub(super) fn open(input: &Input) -> Result<ColumnTable, RecordingError> {
-    let mut reader = Reader::from_reader(BufReader::new(input.open()?));
-    reader.config_mut().trim_text(true);
+    let mut reader = StreamsReader::new(BufReader::new(input.open()?));
     let mut stream = Stream::default();
-    let mut buffer = Vec::new();
     loop {
-        let event = reader.read_event_into(&mut buffer).map_err(|error| {
+        let event = reader.read_event().map_err(|error| {
             RecordingError::with_format_reason(
                 &input.file,
-                format!("the XML is broken at byte {}: {error}", reader.error_position()),
-                format!("XML在第{}字节处损坏：{error}", reader.error_position()),
+                error.to_string(),
+                format!("XML在第{}字节处损坏：{}", error.at, error.what),
             )
         })?;
         match event {
-            Event::Start(element) => stream.begin_element(&element),
-            Event::Text(text) => stream.record_value(&text),
-            Event::End(_) => stream.open = None,
-            Event::Eof => break,
-            _ => {}
+            Some(StreamsEvent::Observation(observation)) => stream.record_observation(&observation),
+            Some(StreamsEvent::Header(_) | StreamsEvent::Error { .. }) => {}
+            None => break,
         }
         if stream.cells > CELLS_IN_MEMORY_MAX || stream.items.len() > COLUMNS_MAX {
             return Err(RecordingError::with_format_reason(
@@ -87,9 +52,8 @@ pub(super) fn open(input: &Input) -> Result<ColumnTable, RecordingError> {
                 "观测值过多：请减少一次请求的数量",
             ));
         }
-        buffer.clear();
     }
-    if !stream.is_streams {
+    if reader.root() != Some("MTConnectStreams") {
         return Err(RecordingError::with_format_reason(
             &input.file,
             "this is XML, but no answer of an MTConnect agent (MTConnectStreams): export the data as CSV",
@@ -112,48 +76,37 @@ pub(super) fn open(input: &Input) -> Result<ColumnTable, RecordingError> {
 }
 
 impl Stream {
-    fn begin_element(&mut self, element: &BytesStart<'_>) {
-        self.open = None;
-        let tag = element.local_name().as_ref().to_owned();
-        let attribute = |name: &str| {
-            let found = element.attributes().flatten().find(|attribute| attribute.key.as_ref() == name);
-            found.map(|attribute| attribute.value.into_owned())
+    fn record_observation(&mut self, observation: &Observation) {
+        let index = match self.known.get(&observation.item) {
+            Some(index) => *index,
+            None => {
+                let name = self.choose_name(observation);
+                self.known.insert(observation.item.clone(), self.items.len());
+                self.items.push(Item { name, times: Vec::new(), values: Vec::new() });
+                self.items.len() - 1
+            }
         };
-        match tag.as_str() {
-            "MTConnectStreams" => self.is_streams = true,
-            "ComponentStream" => {
-                self.component = (attribute("component").unwrap_or_default(), attribute("name").unwrap_or_default())
-            }
-            _ => {
-                let (Some(item), Some(time)) = (attribute("dataItemId"), attribute("timestamp")) else { return };
-                let name = self.choose_name(&tag, &item, attribute("subType").as_deref());
-                let index = *self.known.entry(item).or_insert_with(|| {
-                    self.items.push(Item { name, times: Vec::new(), values: Vec::new() });
-                    self.items.len() - 1
-                });
-                self.open = Some((index, time));
-            }
+        if observation.text.is_empty() {
+            return;
         }
-    }
-
-    fn record_value(&mut self, text: &str) {
-        let Some((index, time)) = self.open.take() else { return };
-        let item = &mut self.items[index];
-        item.times.push(OwnedCell::from_text(&time));
-        item.values.push(if text == "UNAVAILABLE" { OwnedCell::Empty } else { OwnedCell::from_text(text) });
+        let (item, text) = (&mut self.items[index], observation.text.as_str());
+        item.times.push(OwnedCell::from_text(&observation.timestamp));
+        item.values.push(if text == UNAVAILABLE { OwnedCell::Empty } else { OwnedCell::from_text(text) });
         self.cells += 2;
     }
 
     /// A name of our dictionary where type and component tell the column, else the item's own.
-    fn choose_name(&self, tag: &str, item: &str, sub_type: Option<&str>) -> String {
-        let is_actual = sub_type.is_none_or(|sub_type| sub_type.eq_ignore_ascii_case("ACTUAL"));
-        let is_spindle = SPINDLES.contains(&self.component.0.as_str());
+    fn choose_name(&self, observation: &Observation) -> String {
+        let item = observation.item.as_str();
+        let is_actual = observation.sub_type.as_ref().is_none_or(|sub_type| sub_type.eq_ignore_ascii_case("ACTUAL"));
+        let is_spindle = SPINDLES.contains(&observation.component.as_str());
         let taken = |name: &String| self.items.iter().any(|known| known.name == *name);
-        let known = TYPES.iter().find(|(known, ..)| *known == tag).filter(|_| is_actual);
-        let unit = TYPES.iter().find(|(known, ..)| *known == tag).map_or("", |(.., unit)| unit);
-        let wanted = known.map(|(_, words, unit)| {
-            let of_spindle = is_spindle && ["Power", "Current", "Load", "Torque"].contains(words);
-            let words = if of_spindle { format!("Spindle {}", words.to_lowercase()) } else { (*words).to_owned() };
+        let known = find_type(&observation.element);
+        let unit = known.map_or("", |known| known.unit);
+        let wanted = known.filter(|_| is_actual).map(|known| {
+            let of_spindle = is_spindle && ["Power", "Current", "Load", "Torque"].contains(&known.words);
+            let words =
+                if of_spindle { format!("Spindle {}", known.words.to_lowercase()) } else { known.words.to_owned() };
             if unit.is_empty() { words } else { format!("{words} [{unit}]") }
         });
         match wanted.filter(|name| !taken(name)) {

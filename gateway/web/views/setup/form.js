@@ -7,6 +7,7 @@ import { box, t } from "/web/words.js";
 const DEVICES = [
   ["fanuc", (host) => `fanuc://${host}`, "192.168.1.10:8193"],
   ["nclink", (host) => `nclink://${host}`, "192.168.1.5:1883/SERIAL"],
+  ["mtconnect", (host) => `mtconnect://${host}`, "192.168.1.30:5000/DEVICE"],
   ["modbus_tcp", (host) => `modbus-tcp://${host}`, "192.168.1.20:502?profile=sdm630&unit=1"],
   ["modbus_rtu", (host) => `modbus-rtu://${host}`, "/dev/ttyUSB0?profile=sdm630&unit=1&baud=9600"],
   ["simulated", (host) => `simulated://${host}`, "lathe"],
