@@ -18,6 +18,7 @@ mod page;
 mod replay;
 mod service;
 mod settings;
+mod story;
 mod system;
 pub(crate) mod twin;
 mod update;
