@@ -19,6 +19,8 @@ use testkit::broker::{Broker, program as find_program};
 use testkit::process::{Gateway, get, program, run, stdout, text, try_get, wait_for};
 use views::{Tick, Ticks};
 
+/// So many times as fast as it was recorded.
+const SPEED: f64 = 60.0;
 const FAKETIME: &str = "/usr/lib/x86_64-linux-gnu/faketime/libfaketime.so.1";
 
 /// `mosquitto_sub`, and every document that it has heard.
@@ -212,9 +214,12 @@ fn compare_driver(compared: &mut Compared, stored: &Ticks, course: Course) {
     assert!(least * 3 >= stored.len(), "only {least} of {} ticks hold what the source delivered", stored.len());
 }
 
-/// Beginnings and words of the states, ms.
-fn intervals(rows: &[Json], since: &str, moved: impl Fn(&Json) -> i64) -> Vec<String> {
-    let line = |row: &Json| format!("{} {}", if since.is_empty() { moved(row) } else { row[since].as_i64().expect("ms") }, row["state"].as_str().unwrap_or("?"));
+/// Beginnings and words of the states, in ms since 1970, as `since` says; without a key those of items.
+fn intervals(rows: &[Json], since: Option<&str>, moves: &[Json]) -> Vec<String> {
+    let line = |row: &Json| match since {
+        Some(key) => format!("{} {}", row[key].as_i64().expect("ms"), row["state"].as_str().expect("a word")),
+        None => format!("{} {}", views::moved_ms(row, moves), row["record"]["state"].as_str().expect("a word")),
+    };
     let mut lines: Vec<String> = rows.iter().map(line).collect();
     lines.sort();
     lines.dedup();
@@ -228,12 +233,11 @@ fn compare_states(compared: &mut Compared, of_api: &Json, database: &Path, items
     let command: Json = serde_json::from_str(&stdout(&output)).expect("JSON");
     let of_items: Vec<Json> = items.iter().filter(|item| item["kind"] == "state").cloned().collect();
     let rows = |document: &Json| document["rows"].as_array().expect("rows").clone();
-    let none = |_: &Json| 0;
-    let wanted = intervals(&sql, "since_ms", none);
+    let wanted = intervals(&sql, Some("since_ms"), moves);
     let found = [
-        ("states: command", intervals(&rows(&command), "from_ms", none)),
-        ("states: API", intervals(&rows(of_api), "from_ms", none)),
-        ("states: MQTT", intervals(&of_items, "", |item| views::moved_ms(item, moves))),
+        ("states: command", intervals(&rows(&command), Some("from_ms"), moves)),
+        ("states: API", intervals(&rows(of_api), Some("from_ms"), moves)),
+        ("states: MQTT", intervals(&of_items, None, moves)),
     ];
     for (view, lines) in found {
         compared.same(view, &|| "intervals".to_owned(), &json!(lines), &json!(wanted));
@@ -261,27 +265,33 @@ fn read_page(browser: &mut Browser) -> Json {
 
 /// What is printed on the page is the stored number in the page's own digits.
 fn compare_page(compared: &mut Compared, browser: &mut Browser, moments: &[Json], stored: &Ticks) {
+    let mut figures: Vec<(String, &Json, &Json)> = Vec::new();
     for moment in moments {
         let at_ms = moment["at"].as_i64().expect("a time");
         let Some(known) = stored.get(&at_ms) else { continue };
         for shown in moment["shown"].as_array().expect("figures") {
-            let Some(name) = shown[0].as_str().filter(|name| known.contains_key(*name)) else { continue };
-            let value = &known[name];
-            let what = || format!("{name} at {at_ms}");
-            let Some(number) = value.as_f64() else {
-                compared.same("page Now", &what, &json!(shown[1].is_null()), &json!(true));
-                continue;
-            };
-            let unit = name.rsplit('_').next().unwrap_or("");
-            let unit = match unit { "pct" => "%", "min" => "mm/min", "w" => "W", other => other };
-            let text = browser.value(&format!("import('/web/format.js').then((it) => it.number({number}, '{unit}'))"));
-            compared.same("page Now", &what, &shown[2], &text);
+            if let Some(value) = shown[0].as_str().and_then(|name| known.get(name)) {
+                figures.push((format!("{} at {at_ms}", shown[0]), shown, value));
+            }
+        }
+    }
+    let asked: Vec<Json> = figures.iter().map(|(_, shown, value)| json!([shown[0], value])).collect();
+    let texts = browser.value(&format!(
+        "import('/web/format.js').then((it) => {}.map(([name, value]) => typeof value !== 'number' ? null :
+            it.number(value, {{ w: 'W', pct: '%', min: 'mm/min', rpm: 'rpm' }}[name.split('_').pop()])))",
+        Json::from(asked)
+    ));
+    for ((what, shown, value), text) in figures.iter().zip(texts.as_array().expect("texts")) {
+        match value.as_f64() {
+            Some(_) => compared.same("page Now", &|| what.clone(), &shown[2], text),
+            None => compared.same("page Now", &|| what.clone(), &json!(shown[1].is_null()), &json!(true)),
         }
     }
 }
 
 /// Plays the recording, looks at every view, and compares.
-fn follow(course: Course, speed: f64, wrong_clock: bool, look: bool) {
+fn follow(course: Course, changes_least: usize, wrong_clock: bool, look: bool) {
+    let speed = SPEED;
     let Some(mut story) = Story::start(course, speed, wrong_clock) else { return };
     let heard = Heard::of(story.broker.port);
     let mut address = story.gateway.address();
@@ -315,7 +325,12 @@ fn follow(course: Course, speed: f64, wrong_clock: bool, look: bool) {
             outage = false;
         }
         match &mut browser {
-            Some(browser) => shown.push(read_page(browser)),
+            Some(browser) => {
+                let moment = read_page(browser);
+                if shown.last().is_none_or(|last: &Json| last["at"] != moment["at"]) {
+                    shown.push(moment);
+                }
+            }
             None => std::thread::sleep(Duration::from_millis(100)),
         }
     }
@@ -330,13 +345,12 @@ fn follow(course: Course, speed: f64, wrong_clock: bool, look: bool) {
     watching.into_iter().for_each(|it| it.join().expect("no panic"));
     let mut compared = Compared::default();
     let database = story.database();
-    let stored_early = views::by_sql(&database, &names);
-    if let Some(browser) = &mut browser {
-        compare_page(&mut compared, browser, &shown, &stored_early);
-    }
     story.gateway.stop();
     std::thread::sleep(Duration::from_millis(300));
     let stored = views::by_sql(&database, &names);
+    if let Some(browser) = &mut browser {
+        compare_page(&mut compared, browser, &shown, &stored);
+    }
     let items = heard.lines.lock().expect("whole").clone();
     let redated = views::rows(&database, "SELECT detail FROM events WHERE kind = 'clock_redated'");
     let detail: Json = redated.first().and_then(|row| serde_json::from_str(row["detail"].as_str()?).ok()).unwrap_or_default();
@@ -351,13 +365,13 @@ fn follow(course: Course, speed: f64, wrong_clock: bool, look: bool) {
     compare_live(&mut compared, &seen.lock().expect("whole"), by_ms, &stored, &names);
     let changes = compare_states(&mut compared, &states_of_api, &database, &items, &moves, &stored);
     println!("{} ticks, {changes} changes of state, {} items, {} moments of the page", stored.len(), items.len(), shown.len());
-    assert!(changes >= course.steps / course.state_steps, "{changes} changes");
     compared.finish();
+    assert!(changes >= changes_least, "{changes} changes");
 }
 
 #[test]
 fn a_number_is_the_same_in_every_view() {
-    follow(Course { steps: 12, rows: 15, state_steps: 3 }, 60.0, false, false);
+    follow(Course { steps: 12, rows: 15, state_steps: 3 }, 3, false, false);
 }
 
 /// `cargo test --test box whole::story -- --ignored --nocapture`
@@ -367,5 +381,5 @@ fn an_hour_with_a_wrong_clock_and_outages_is_the_same_in_every_view() {
     if !browser::is_there() {
         return;
     }
-    follow(Course { steps: 240, rows: 15, state_steps: 8 }, 60.0, true, true);
+    follow(Course { steps: 240, rows: 15, state_steps: 8 }, 30, true, true);
 }

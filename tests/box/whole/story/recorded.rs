@@ -28,6 +28,9 @@ pub(super) const HELD_FROM: usize = 11;
 /// Texts, and what stands before the number in them. `block` names the step.
 const TEXTS: [(&str, &str); 4] = [("block", "N"), ("program", "O"), ("tool", "T"), ("operation", "op ")];
 
+/// Rows for which the last step stands.
+const TAIL_ROWS: usize = 3600;
+
 /// How long the recording is, and how often it changes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Course {
@@ -105,7 +108,9 @@ pub(super) fn csv(course: Course) -> String {
             number => number.to_string(),
         };
         let cells: Vec<String> = channels.iter().map(cell).collect();
-        for row in 0..course.rows {
+        // The last step stands while everybody is asked: a box whose recording is over ends.
+        let rows = course.rows + if step + 1 == course.steps { TAIL_ROWS } else { 0 };
+        for row in 0..rows {
             let _written = writeln!(text, "{},{}", step * course.rows + row, cells.join(","));
         }
     }
