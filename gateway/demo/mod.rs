@@ -51,7 +51,9 @@ const DECADES_S: Range<f64> = 1.5e9..4e9;
 #[must_use]
 pub fn config_text(speed: MachineSpeed) -> String {
     let day = match speed {
-        MachineSpeed::Real => "day=short&begun_s=44&wear_mm=0.27&change_h=0&change_friction_pct=150&dropouts_per_h=0&gauge_um=0.5",
+        MachineSpeed::Real => {
+            "day=short&begun_s=44&wear_mm=0.27&change_h=0&change_friction_pct=150&dropouts_per_h=0&gauge_um=0.5"
+        }
         MachineSpeed::Times(_) | MachineSpeed::Max => "day=shifts",
     };
     format!("[gateway]\nname = \"Simulated lathe\"\n\n[[source]]\naddress = \"simulated://lathe?{day}\"\n")

@@ -14,8 +14,8 @@ mod wear_news;
 
 pub use channels::Channels;
 pub use decide::{Decisions, ShownChange};
-pub use extras::{list_series as stored_series, round_as_stored};
 use extras::{StoredEstimates, list_script_series, own_value};
+pub use extras::{list_series as stored_series, round_as_stored};
 pub use journal::Journal;
 pub use part_detail::{OperationUse, PartDetail, ToolUse};
 pub use parts::CycleFollower;

@@ -167,7 +167,12 @@ impl Compared {
 
     fn finish(self) {
         println!("values compared, by view: {:?}", self.values);
-        assert!(self.wrong.is_empty(), "{} disagree:\n{}", self.wrong.len(), self.wrong[..self.wrong.len().min(40)].join("\n"));
+        assert!(
+            self.wrong.is_empty(),
+            "{} disagree:\n{}",
+            self.wrong.len(),
+            self.wrong[..self.wrong.len().min(40)].join("\n")
+        );
     }
 }
 
@@ -198,7 +203,9 @@ fn compare_driver(compared: &mut Compared, stored: &Ticks, course: Course) {
         for name in channels() {
             // Beside a silence or an empty step a quantity may already be gone.
             let value = &tick[name];
-            if value.is_null() && (is_continuous(name) || [step, step + 1].iter().any(|it| is_silent(*it) || is_empty(*it))) {
+            if value.is_null()
+                && (is_continuous(name) || [step, step + 1].iter().any(|it| is_silent(*it) || is_empty(*it)))
+            {
                 continue;
             }
             match agrees(name, value, step, course) {
@@ -227,7 +234,14 @@ fn intervals(rows: &[Json], since: Option<&str>, moves: &[Json]) -> Vec<String> 
 }
 
 /// The changes of state: in the samples, as intervals in SQL, API and command, and as items.
-fn compare_states(compared: &mut Compared, of_api: &Json, database: &Path, items: &[Json], moves: &[Json], stored: &Ticks) -> usize {
+fn compare_states(
+    compared: &mut Compared,
+    of_api: &Json,
+    database: &Path,
+    items: &[Json],
+    moves: &[Json],
+    stored: &Ticks,
+) -> usize {
     let sql = views::rows(database, "SELECT state, since_ns / 1000000 AS since_ms FROM states");
     let output = run(&["history", "query", "--history", text(database), "--records", "states", "--json"]);
     let command: Json = serde_json::from_str(&stdout(&output)).expect("JSON");
@@ -353,7 +367,8 @@ fn follow(course: Course, changes_least: usize, wrong_clock: bool, look: bool) {
     }
     let items = heard.lines.lock().expect("whole").clone();
     let redated = views::rows(&database, "SELECT detail FROM events WHERE kind = 'clock_redated'");
-    let detail: Json = redated.first().and_then(|row| serde_json::from_str(row["detail"].as_str()?).ok()).unwrap_or_default();
+    let detail: Json =
+        redated.first().and_then(|row| serde_json::from_str(row["detail"].as_str()?).ok()).unwrap_or_default();
     assert_eq!(detail.is_null(), !wrong_clock, "{detail}");
     let moves = detail["moves"].as_array().cloned().unwrap_or_default();
     let by_ms = detail["by_ns"][0].as_i64().unwrap_or(0).div_euclid(1_000_000);
@@ -364,7 +379,12 @@ fn follow(course: Course, changes_least: usize, wrong_clock: bool, look: bool) {
     compared.ticks("MQTT", &views::by_items(&items, stored.keys().copied(), &names, &moves), &stored);
     compare_live(&mut compared, &seen.lock().expect("whole"), by_ms, &stored, &names);
     let changes = compare_states(&mut compared, &states_of_api, &database, &items, &moves, &stored);
-    println!("{} ticks, {changes} changes of state, {} items, {} moments of the page", stored.len(), items.len(), shown.len());
+    println!(
+        "{} ticks, {changes} changes of state, {} items, {} moments of the page",
+        stored.len(),
+        items.len(),
+        shown.len()
+    );
     compared.finish();
     assert!(changes >= changes_least, "{changes} changes");
 }

@@ -127,8 +127,9 @@ pub(super) fn agrees(channel: &str, found: &Json, step: usize, course: Course) -
         return Some(true);
     }
     let neighbours = [of(step.saturating_sub(1)), of(step + 1)];
-    let between = neighbours.iter().filter_map(Json::as_f64).any(|other| {
-        (own.min(other) - tolerance..=own.max(other) + tolerance).contains(&number)
-    });
+    let between = neighbours
+        .iter()
+        .filter_map(Json::as_f64)
+        .any(|other| (own.min(other) - tolerance..=own.max(other) + tolerance).contains(&number));
     if is_continuous(channel) && between { None } else { Some(false) }
 }
