@@ -9,6 +9,7 @@ mod documents;
 mod driver;
 mod effect;
 mod identifiers;
+mod pictures;
 mod run;
 mod settings;
 

@@ -15,6 +15,7 @@ mod operations;
 mod package;
 mod packaged_root;
 mod page;
+mod readme;
 mod replay;
 mod service;
 mod settings;

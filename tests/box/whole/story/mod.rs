@@ -181,8 +181,8 @@ fn compare_live(compared: &mut Compared, seen: &[Moment], by_ms: i64, stored: &T
     let mut found = 0;
     for moment in seen {
         let at_ms = moment.status["at_ms"].as_i64().expect("a time") + if moment.dated { 0 } else { by_ms };
-        // The last ticks of a run that ends may be told and not be stored any more.
-        let Some(known) = stored.get(&at_ms).or_else(|| stored.get(&(at_ms - 1))) else { continue };
+        // The last ticks of a run that ends may be told and not be stored any more; a sum of two times that were cut to ms is 1 ms less.
+        let Some(known) = stored.get(&at_ms).or_else(|| stored.get(&(at_ms + 1))) else { continue };
         found += 1;
         compared.tick("status (Now)", at_ms, &views::by_status(&moment.status, names), known);
         let Some(metrics) = &moment.metrics else { continue };

@@ -1,0 +1,76 @@
+//! The pictures of README, made of the demonstration by a command, each with the figures that it shows beside it.
+//!
+//! `tests/handbook/pictures.rs` adds those figures up, and holds each picture against the sum in its file.
+
+use super::browser::{self, Browser};
+use super::views::base64;
+use serde_json::{Value as Json, json};
+use sha2::{Digest, Sha256};
+use std::path::Path;
+use std::time::Duration;
+use testkit::process::{Gateway, get, wait_for};
+
+/// Holds back what the box tells while a picture is taken: figures and picture are of one moment.
+const STANDS_STILL: &str = "(() => { const Own = EventSource; window.EventSource = class extends Own {
+    addEventListener(kind, take) { super.addEventListener(kind, (event) => window.standsStill || take(event)); } }; })()";
+
+/// Text of the figure of a part of the power, a number in watts.
+const NOW: &str = "(() => { const watts = (it) => Number(it.textContent.replace(/[^0-9.-]/g, ''));
+    const part = (key) => watts(document.querySelector(`[data-part=${key}] b`));
+    const shown = [...document.querySelectorAll('[data-part] b')].every((it) => /\\d/.test(it.textContent));
+    return { shown: shown && document.getElementById('state').dataset.word === 'cutting',
+        sum_w: watts(document.querySelector('.power [data-quantity=spindle_power_w]')),
+        parts_w: ['no_load_power_w', 'load_loss_w', 'cutting_power_w', 'rest'].map(part) }; })()";
+
+/// Recorded is simulated plus the difference.
+const TWIN: &str = "(() => { const rows = [...document.querySelectorAll('main .row')];
+    const line = (what) => rows.find((it) => it.querySelector('.what')?.textContent === what)?.querySelector('.num').textContent ?? '';
+    const watts = (what) => Number(line(what).replace(/[^0-9.-]/g, ''));
+    const names = ['Recorded', 'Simulated', 'Recorded minus simulated'];
+    return { shown: names.every((it) => /\\d/.test(line(it))) && watts('Recorded') > 300,
+        sum_w: watts('Recorded'), parts_w: [watts('Simulated'), watts('Recorded minus simulated')] }; })()";
+
+/// Takes the picture of one view when it shows what it should, and writes it with its figures.
+fn take(browser: &mut Browser, address: &str, name: &str, figures: &str) {
+    browser.open(&format!("http://{address}/{name}?lang=en"));
+    browser.wait_until("document.body?.dataset.fresh === 'yes' && document.querySelector('.uplot canvas')");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("gateway/handbook/pictures");
+    wait_for(name, Duration::from_secs(120), || {
+        browser.value("window.standsStill = true; 0");
+        let before = browser.value(figures);
+        let picture = base64(&browser.picture_of_window());
+        let whole = before == browser.value(figures) && browser.value("document.body.dataset.fresh") == "yes";
+        browser.value("window.standsStill = false; 0");
+        if before["shown"] != true || !whole {
+            return None;
+        }
+        let sum: String = Sha256::digest(&picture).iter().map(|byte| format!("{byte:02x}")).collect();
+        let told = json!({ "picture": format!("{name}.png"), "sha256": sum, "sum_w": before["sum_w"], "parts_w": before["parts_w"] });
+        std::fs::write(folder.join(format!("{name}.png")), picture).expect("written");
+        std::fs::write(folder.join(format!("{name}.json")), format!("{told:#}\n")).expect("written");
+        println!("{name}: {told}");
+        Some(())
+    });
+}
+
+/// `cargo test --test box pictures_of_the_readme -- --ignored`
+#[test]
+#[ignore = "writes into the tree: makes the pictures of README anew, 2 minutes"]
+fn pictures_of_the_readme_are_made() {
+    if !browser::is_there() {
+        return;
+    }
+    let directory = tempfile::tempdir().expect("a directory");
+    let mut gateway = Gateway::start(&directory.path().join("data"), &[]);
+    let address = gateway.address();
+    wait_for("the worn edge", Duration::from_secs(120), || {
+        let alarms: Json = get(&address, "/api/v1/status").json()["alarms"].clone();
+        alarms.to_string().contains("tool_worn").then_some(())
+    });
+    let mut browser = Browser::start(directory.path());
+    browser.size(1280, 800);
+    browser.before_every_document(STANDS_STILL);
+    take(&mut browser, &address, "now", NOW);
+    take(&mut browser, &address, "twin", TWIN);
+    gateway.stop();
+}
