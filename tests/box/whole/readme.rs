@@ -8,7 +8,7 @@ use serde_json::{Value as Json, json};
 use sha2::{Digest, Sha256};
 use std::path::Path;
 use std::time::Duration;
-use testkit::process::{Gateway, get, wait_for};
+use testkit::process::{Gateway, get, program, wait_for};
 
 /// Holds back what the box tells while a picture is taken: figures and picture are of one moment.
 const STANDS_STILL: &str = "(() => { const Own = EventSource; window.EventSource = class extends Own {
@@ -37,6 +37,7 @@ fn take(browser: &mut Browser, address: &str, name: &str, figures: &str) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("gateway/handbook/pictures");
     wait_for(name, Duration::from_secs(120), || {
         browser.value("window.standsStill = true; 0");
+        browser.wait_until("document.getAnimations().every((it) => it.playState !== 'running')");
         let before = browser.value(figures);
         let picture = base64(&browser.picture_of_window());
         let whole = before == browser.value(figures) && browser.value("document.body.dataset.fresh") == "yes";
@@ -61,14 +62,18 @@ fn pictures_of_the_readme_are_made() {
         return;
     }
     let directory = tempfile::tempdir().expect("a directory");
-    let mut gateway = Gateway::start(&directory.path().join("data"), &[]);
+    // In its own folder, so that a picture shows the path that a reader has.
+    let mut command = program();
+    command.current_dir(directory.path()).args(["run", "--data-dir", "cnc-gateway-data", "--listen", "127.0.0.1:0"]);
+    let mut gateway = Gateway::spawn(command);
     let address = gateway.address();
     wait_for("the worn edge", Duration::from_secs(120), || {
         let alarms: Json = get(&address, "/api/v1/status").json()["alarms"].clone();
         alarms.to_string().contains("tool_worn").then_some(())
     });
     let mut browser = Browser::start(directory.path());
-    browser.size(1280, 800);
+    browser.size(1280, 1000);
+    browser.call("Emulation.setScrollbarsHidden", &json!({ "hidden": true }));
     browser.before_every_document(STANDS_STILL);
     take(&mut browser, &address, "now", NOW);
     take(&mut browser, &address, "twin", TWIN);

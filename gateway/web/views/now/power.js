@@ -1,6 +1,6 @@
 // Now: where the power of the spindle goes, at this moment and in the last ten minutes.
 import { ask, make, say } from "/web/parts.js";
-import { number, quantity as shown } from "/web/format.js";
+import { number, printed, quantity as shown } from "/web/format.js";
 import { t } from "/web/words.js";
 import { TimePlot, drawnFrom } from "/web/plot.js";
 import { StateRibbon } from "/web/ribbon.js";
@@ -19,9 +19,6 @@ const PARTS = ["no_load_power_w", "load_loss_w", "cutting_power_w"];
 /** What the load loss of the drive enters. */
 const LOSSY = new Set(["load_loss_w", "cutting_power_w"]);
 
-/** Watts as they are printed: in whole ones from ten on. */
-const printed = (watts) => Number(watts.toFixed(Math.abs(watts) < 10 ? 1 : 0));
-
 /** The parts of the power, W, and the rest, which add up to the power that is printed; or the word for why they are withheld. */
 export function split(quantity) {
   const none = { watts: null, rest: null, why: null };
@@ -30,7 +27,7 @@ export function split(quantity) {
   const power = quantity("spindle_power_w");
   if (without !== undefined || !power || power.missing) return none;
   const watts = found.map((it) => Math.round(it.value));
-  const rest = printed(printed(power.value) - watts.reduce((sum, it) => sum + it, 0));
+  const rest = Number((printed(power.value, "W") - watts.reduce((sum, it) => sum + it, 0)).toFixed(1));
   const sd = Math.hypot(...found.map((it) => it.uncertainty ?? 0));
   const within = Math.max(SAME_MOMENT_SHARE * Math.abs(power.value), SAME_MOMENT_SD * sd, 5);
   return Math.abs(rest) <= within ? { watts, rest, why: null } : { ...none, why: "parts_of_another_moment" };

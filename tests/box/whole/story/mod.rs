@@ -192,7 +192,13 @@ fn compare_live(compared: &mut Compared, seen: &[Moment], by_ms: i64, stored: &T
             compared.same("Prometheus", &|| format!("{name} at {at_ms}"), &json!(told), &json!(expected));
         }
     }
-    assert!(found * 10 >= seen.len() * 9, "only {found} of {} moments are stored", seen.len());
+    let times: Vec<(bool, i64)> = seen.iter().map(|it| (it.dated, it.status["at_ms"].as_i64().unwrap_or(0))).collect();
+    let span = (stored.keys().next(), stored.keys().next_back());
+    assert!(
+        found * 10 >= seen.len() * 9,
+        "only {found} of {} moments are stored: {by_ms} {span:?} {times:?}",
+        seen.len()
+    );
 }
 
 /// What the source has delivered: at every tick the value of its step, or on the way to it.
