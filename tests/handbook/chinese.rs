@@ -21,7 +21,7 @@ struct Said {
 }
 
 /// Numbers as they are written: digits with commas between thousands and a decimal point.
-fn numbers(text: &str) -> Vec<String> {
+fn find_numbers(text: &str) -> Vec<String> {
     let mut found = Vec::new();
     let letters: Vec<char> = text.chars().collect();
     let mut at = 0;
@@ -44,7 +44,7 @@ fn numbers(text: &str) -> Vec<String> {
 }
 
 /// Sections of a chapter, without its blocks of code.
-fn sections(text: &str) -> Vec<Said> {
+fn split_sections(text: &str) -> Vec<Said> {
     let mut sections = vec![Said::default()];
     let mut in_block = false;
     for line in text.lines() {
@@ -71,7 +71,7 @@ fn sections(text: &str) -> Vec<Said> {
                 .enumerate()
                 .map(|(at, it)| if at == 0 { it } else { it.split_once(')').map_or("", |it| it.1) })
                 .collect();
-            for number in shown.iter().flat_map(|it| numbers(it)) {
+            for number in shown.iter().flat_map(|it| find_numbers(it)) {
                 *said.numbers.entry(number).or_default() += 1;
             }
         }
@@ -80,7 +80,7 @@ fn sections(text: &str) -> Vec<Said> {
 }
 
 /// A line of code without the words that follow a comment sign.
-fn without_comment(line: &str) -> &str {
+fn strip_comment(line: &str) -> &str {
     let signs = [" # ", " -- ", " // "];
     let ends = signs.iter().filter_map(|sign| line.find(sign)).min().unwrap_or(line.len());
     let own = line[..ends].trim_end();
@@ -88,31 +88,31 @@ fn without_comment(line: &str) -> &str {
 }
 
 /// Blocks that a reader copies; pictures in letters and what a program prints are told in the reader's language.
-fn copied(document: &Document) -> Vec<Vec<String>> {
+fn list_copied(document: &Document) -> Vec<Vec<String>> {
     let lines =
-        |block: &crate::documents::Block| block.lines.iter().map(|line| without_comment(line).to_owned()).collect();
+        |block: &crate::documents::Block| block.lines.iter().map(|line| strip_comment(line).to_owned()).collect();
     document.blocks().iter().filter(|block| block.language != "text").map(lines).collect()
 }
 
-fn document(name: &str, text: &str) -> Document {
+fn name_document(name: &str, text: &str) -> Document {
     Document { name: name.to_owned(), path: root(), text: text.to_owned() }
 }
 
 /// What differs between two sections.
-fn differences(own: &Said, other: &Said) -> Vec<String> {
+fn list_differences(own: &Said, other: &Said) -> Vec<String> {
     let mut wrong = Vec::new();
     for span in own.spans.difference(&other.spans) {
         wrong.push(format!("`{span}` is missing"));
     }
     for (number, count) in &own.numbers {
-        let there = other.numbers.get(number).copied().unwrap_or(0);
+        let there = other.numbers.get(number).list_copied().unwrap_or(0);
         if there < *count {
             wrong.push(format!("{number} stands {there} times, in English {count}"));
         }
     }
     let small = |number: &str| number.parse::<f64>().is_ok_and(|it| it <= WORDS_UP_TO);
     for (number, count) in other.numbers.iter().filter(|(number, _)| !small(number)) {
-        let there = own.numbers.get(number).copied().unwrap_or(0);
+        let there = own.numbers.get(number).list_copied().unwrap_or(0);
         if there < *count {
             wrong.push(format!("{number} stands {count} times, in English {there}"));
         }
@@ -125,14 +125,16 @@ fn chinese_chapters_have_the_code_and_the_numbers_of_the_english_ones() {
     let (mut wrong, mut compared) = (Vec::new(), 0);
     for chapter in CHAPTERS {
         let Some(zh) = chapter.zh else { continue };
-        let (own, other) = (sections(chapter.text), sections(zh));
+        let (own, other) = (split_sections(chapter.text), split_sections(zh));
         assert_eq!(own.len(), other.len(), "{}: sections", chapter.topic);
         for (own, other) in own.iter().zip(&other) {
             compared += own.numbers.len() + own.spans.len();
-            wrong
-                .extend(differences(own, other).into_iter().map(|it| format!("{} {}: {it}", chapter.topic, own.title)));
+            wrong.extend(
+                list_differences(own, other).into_iter().map(|it| format!("{} {}: {it}", chapter.topic, own.title)),
+            );
         }
-        let (own, other) = (copied(&document(chapter.topic, chapter.text)), copied(&document(chapter.topic, zh)));
+        let (own, other) =
+            (list_copied(&name_document(chapter.topic, chapter.text)), list_copied(&name_document(chapter.topic, zh)));
         assert_eq!(own, other, "{}: what is copied", chapter.topic);
     }
     println!("{compared} numbers and pieces of code compared");
@@ -150,7 +152,7 @@ fn every_chapter_for_the_shop_is_there_in_chinese() {
 
 #[test]
 fn numbers_are_found_as_they_are_written() {
-    assert_eq!(numbers("1,024个地址，2.5 s，MQTT5 不算，0至4"), ["1,024", "2.5", "0", "4"]);
-    assert_eq!(without_comment("a = 1   # 注释"), "a = 1");
-    assert_eq!(without_comment("# 注释"), "");
+    assert_eq!(find_numbers("1,024个地址，2.5 s，MQTT5 不算，0至4"), ["1,024", "2.5", "0", "4"]);
+    assert_eq!(strip_comment("a = 1   # 注释"), "a = 1");
+    assert_eq!(strip_comment("# 注释"), "");
 }

@@ -12,7 +12,7 @@ use testkit::process::{Gateway, get, program, wait_for};
 
 /// Holds back what the box tells while a picture is taken: figures and picture are of one moment.
 const STANDS_STILL: &str = "(() => { const Own = EventSource; window.EventSource = class extends Own {
-    addEventListener(kind, take) { super.addEventListener(kind, (event) => window.standsStill || take(event)); } }; })()";
+    addEventListener(kind, handle) { super.addEventListener(kind, (event) => window.standsStill || handle(event)); } }; })()";
 
 /// Text of the figure of a part of the power, a number in watts.
 const NOW: &str = "(() => { const watts = (it) => Number(it.textContent.replace(/[^0-9.-]/g, ''));
@@ -31,7 +31,7 @@ const TWIN: &str = "(() => { const rows = [...document.querySelectorAll('main .r
         sum_w: watts('Recorded'), parts_w: [watts('Simulated'), watts('Recorded minus simulated')] }; })()";
 
 /// Takes the picture of one view when it shows what it should, and writes it with its figures.
-fn take(browser: &mut Browser, address: &str, name: &str, figures: &str) {
+fn take_picture(browser: &mut Browser, address: &str, name: &str, figures: &str) {
     browser.open(&format!("http://{address}/{name}?lang=en"));
     browser.wait_until("document.body?.dataset.fresh === 'yes' && document.querySelector('.uplot canvas')");
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("gateway/handbook/pictures");
@@ -75,7 +75,7 @@ fn pictures_of_the_readme_are_made() {
     browser.size(1280, 1000);
     browser.call("Emulation.setScrollbarsHidden", &json!({ "hidden": true }));
     browser.before_every_document(STANDS_STILL);
-    take(&mut browser, &address, "now", NOW);
-    take(&mut browser, &address, "twin", TWIN);
+    take_picture(&mut browser, &address, "now", NOW);
+    take_picture(&mut browser, &address, "twin", TWIN);
     gateway.stop();
 }

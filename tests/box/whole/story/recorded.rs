@@ -53,17 +53,17 @@ pub(super) fn is_continuous(channel: &str) -> bool {
 }
 
 /// What the machine does in a step: stands, idles, cuts.
-fn work(step: usize, course: Course) -> usize {
+fn find_work(step: usize, course: Course) -> usize {
     step / course.state_steps % 3
 }
 
 /// A share from 0 to 1 with as many digits as a number has.
-fn share(step: usize, salt: usize) -> f64 {
+fn draw_share(step: usize, salt: usize) -> f64 {
     ((step * 7919 + salt * 104_729) % 10_007) as f64 / 10_007.0
 }
 
 /// What the source delivers of this channel in this step.
-pub(super) fn delivered(channel: &str, step: usize, course: Course) -> Json {
+pub(super) fn find_delivered(channel: &str, step: usize, course: Course) -> Json {
     if let Some(found) = TEXTS.iter().find(|it| it.0 == channel) {
         let number = match found.0 {
             "block" => step,
@@ -74,16 +74,16 @@ pub(super) fn delivered(channel: &str, step: usize, course: Course) -> Json {
     }
     let at = NUMBERS.iter().position(|it| it.0 == channel).expect("a channel of the story");
     let (name, least, range) = NUMBERS[at];
-    let doing = work(step, course);
-    let drawn = least + range * share(step, at);
+    let doing = find_work(step, course);
+    let drawn = least + range * draw_share(step, at);
     json!(match (name, doing) {
         ("spindle_speed_rpm" | "feed_mm_min" | "spindle_programmed_rpm", 0) | ("feed_mm_min", 1) => 0.0,
         ("spindle_power_w", 0) => 0.0,
-        ("spindle_power_w", 1) => 520.0 + 9.0 * share(step, at),
-        ("spindle_power_w", _) => 1650.0 + 90.0 * share(step, at),
-        ("total_power_w", 0) => 610.0 + 7.0 * share(step, at),
-        ("total_power_w", 1) => 1420.0 + 9.0 * share(step, at),
-        ("total_power_w", _) => 2600.0 + 90.0 * share(step, at),
+        ("spindle_power_w", 1) => 520.0 + 9.0 * draw_share(step, at),
+        ("spindle_power_w", _) => 1650.0 + 90.0 * draw_share(step, at),
+        ("total_power_w", 0) => 610.0 + 7.0 * draw_share(step, at),
+        ("total_power_w", 1) => 1420.0 + 9.0 * draw_share(step, at),
+        ("total_power_w", _) => 2600.0 + 90.0 * draw_share(step, at),
         _ => drawn,
     })
 }
@@ -98,11 +98,11 @@ pub(super) fn is_empty(step: usize) -> bool {
 }
 
 /// The whole recording as CSV.
-pub(super) fn csv(course: Course) -> String {
+pub(super) fn write_csv(course: Course) -> String {
     let channels = channels();
     let mut text = format!("time_s,{}\n", channels.join(","));
     for step in (0..course.steps).filter(|step| !is_silent(*step)) {
-        let cell = |channel: &&str| match delivered(channel, step, course) {
+        let cell = |channel: &&str| match find_delivered(channel, step, course) {
             _ if is_empty(step) => String::new(),
             Json::String(word) => word,
             number => number.to_string(),
@@ -119,8 +119,8 @@ pub(super) fn csv(course: Course) -> String {
 
 /// Does `found` tell what the source delivered at a moment of `step`? A quantity may lie on the way to the next step or from the
 /// one before, `None`; a number has at most the digits of the history.
-pub(super) fn agrees(channel: &str, found: &Json, step: usize, course: Course) -> Option<bool> {
-    let of = |step: usize| delivered(channel, step, course);
+pub(super) fn agrees_with_source(channel: &str, found: &Json, step: usize, course: Course) -> Option<bool> {
+    let of = |step: usize| find_delivered(channel, step, course);
     let (Some(number), Some(own)) = (found.as_f64(), of(step).as_f64()) else { return Some(*found == of(step)) };
     let tolerance = 0.051_f64.min(own.abs() * 1e-2).max(5.1e-5);
     if (number - own).abs() <= tolerance {

@@ -27,7 +27,7 @@ pub(super) fn by_sql(database: &Path, channels: &[&str]) -> Ticks {
 }
 
 /// The rows of one SELECT.
-pub(super) fn rows(database: &Path, sql: &str) -> Vec<Json> {
+pub(super) fn select_rows(database: &Path, sql: &str) -> Vec<Json> {
     let answer = document(&run(&["history", "query", "--history", text(database), "--json", "--sql", sql]));
     answer["rows"].as_array().expect("rows").clone()
 }
