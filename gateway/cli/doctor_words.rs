@@ -43,7 +43,7 @@ mod tests {
     use std::path::Path;
 
     /// Words of English that stand one behind the other.
-    fn english(text: &str) -> usize {
+    fn count_english_words(text: &str) -> usize {
         let words = text.split(|letter: char| !letter.is_ascii_lowercase()).filter(|word| word.len() > 2);
         words
             .filter(|word| ["the", "and", "that", "with", "has", "not", "for", "its", "are", "nothing"].contains(word))
@@ -59,11 +59,11 @@ mod tests {
             let value =
                 if let FactValue::Text(text) = &fact.value { words.translate_phrases(text) } else { String::new() };
             let told = format!("{}: {value}", words.translate_phrases(&fact.name));
-            assert_eq!(english(&told), 0, "{told}");
+            assert_eq!(count_english_words(&told), 0, "{told}");
         }
         for problem in &report.problems {
             let told = words.format_problem(&problem.what, &problem.next);
-            assert_eq!(english(&told), 0, "{told}");
+            assert_eq!(count_english_words(&told), 0, "{told}");
         }
     }
 

@@ -105,14 +105,14 @@ fn list_differences(own: &Said, other: &Said) -> Vec<String> {
         wrong.push(format!("`{span}` is missing"));
     }
     for (number, count) in &own.numbers {
-        let there = other.numbers.get(number).list_copied().unwrap_or(0);
+        let there = other.numbers.get(number).copied().unwrap_or(0);
         if there < *count {
             wrong.push(format!("{number} stands {there} times, in English {count}"));
         }
     }
     let small = |number: &str| number.parse::<f64>().is_ok_and(|it| it <= WORDS_UP_TO);
     for (number, count) in other.numbers.iter().filter(|(number, _)| !small(number)) {
-        let there = own.numbers.get(number).list_copied().unwrap_or(0);
+        let there = own.numbers.get(number).copied().unwrap_or(0);
         if there < *count {
             wrong.push(format!("{number} stands {count} times, in English {there}"));
         }

@@ -61,7 +61,7 @@ fn pictures_of_the_readme_are_made() {
     if !browser::is_there() {
         return;
     }
-    let directory = tempfile::tempdir().expect("a directory");
+    let directory = tempfile::Builder::new().prefix("demonstration-").tempdir().expect("a directory");
     // In its own folder, so that a picture shows the path that a reader has.
     let mut command = program();
     command.current_dir(directory.path()).args(["run", "--data-dir", "cnc-gateway-data", "--listen", "127.0.0.1:0"]);
