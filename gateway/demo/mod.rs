@@ -7,8 +7,8 @@
 //! days ended an hour before the start. What is known of the wear (`demo/wear.json`) is from one whole life of an edge and most of the
 //! next, 11,100 s of the same machine at `--speed max`; the edges then got the names that the machine gives to its first ones. The wear
 //! model counts only for the work material that it was learned with, which the recipe of the demonstration names. The thermal law
-//! (`demo/thermal.json`) is what `identify thermal --model` made of eight hours of the same lathe in shifts, with the gauge that the
-//! demonstration has (`gauge_um=0.5`). Faster than real time the machine works in shifts with short nights.
+//! (`demo/thermal.json`) is what `identify thermal --model` made of four hours of this very address at `--speed max`, from
+//! a cold start, with the gauge that it has (`gauge_um=0.5`). Faster than real time the machine works in shifts with short nights.
 
 use crate::clock;
 use crate::config::Config;

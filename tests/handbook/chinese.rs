@@ -12,7 +12,7 @@ const WORDS_UP_TO: f64 = 12.0;
 
 /// What of a section a reader would type or compare.
 #[derive(Debug, Default)]
-struct Said {
+struct SectionContent {
     title: String,
     /// How often each number stands in running text and tables.
     numbers: BTreeMap<String, usize>,
@@ -44,8 +44,8 @@ fn find_numbers(text: &str) -> Vec<String> {
 }
 
 /// Sections of a chapter, without its blocks of code.
-fn split_sections(text: &str) -> Vec<Said> {
-    let mut sections = vec![Said::default()];
+fn split_sections(text: &str) -> Vec<SectionContent> {
+    let mut sections = vec![SectionContent::default()];
     let mut in_block = false;
     for line in text.lines() {
         if line.trim_start().starts_with("```") {
@@ -56,7 +56,7 @@ fn split_sections(text: &str) -> Vec<Said> {
             continue;
         }
         if line.starts_with("## ") {
-            sections.push(Said { title: line.to_owned(), ..Said::default() });
+            sections.push(SectionContent { title: line.to_owned(), ..SectionContent::default() });
         }
         let Some(said) = sections.last_mut() else { continue };
         let parts: Vec<&str> = line.split('`').collect();
@@ -99,7 +99,7 @@ fn name_document(name: &str, text: &str) -> Document {
 }
 
 /// What differs between two sections.
-fn list_differences(own: &Said, other: &Said) -> Vec<String> {
+fn list_differences(own: &SectionContent, other: &SectionContent) -> Vec<String> {
     let mut wrong = Vec::new();
     for span in own.spans.difference(&other.spans) {
         wrong.push(format!("`{span}` is missing"));

@@ -56,7 +56,7 @@ fn take_picture(browser: &mut Browser, address: &str, name: &str, figures: &str)
 
 /// `cargo test --test box pictures_of_the_readme -- --ignored`
 #[test]
-#[ignore = "writes into the tree: makes the pictures of README anew, 2 minutes"]
+#[ignore = "2 minutes: makes the pictures of README anew, in the tree"]
 fn pictures_of_the_readme_are_made() {
     if !browser::is_there() {
         return;

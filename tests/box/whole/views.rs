@@ -17,7 +17,7 @@ const VIEWS: [(&str, &str); 10] = [
     ("twin", "document.querySelector('.verdict')?.textContent.length > 2"),
     ("rules", "document.querySelector('.editor-host')?.shadowRoot?.querySelector('.cm-line')"),
     ("audit", "document.querySelector('main table, main .empty')"),
-    ("box", "document.querySelectorAll('main .card').length > 3"),
+    ("box", "document.querySelectorAll('main .card .row').length > 3"),
     ("setup", "document.querySelector('main .card')?.textContent.length > 20"),
     ("help", "document.querySelector('.handbook h1')"),
 ];

@@ -136,15 +136,16 @@ impl SensorWatch {
         let worst = self.model.as_ref().and_then(|model| find_contradicted(model, &seen, &expected));
         for (at, sensor) in self.sensors.iter_mut().enumerate() {
             let others = believed.iter().enumerate().any(|(other, value)| other != at && value.is_some());
-            let told = Told { expected: expected[at], by_others: others, contradicted: worst == Some(at) };
-            sensor.judge_value(at_ns, seen[at], told);
+            let look = SensorLook { expectation: expected[at], has_others: others, is_worst: worst == Some(at) };
+            sensor.judge_value(at_ns, seen[at], look);
         }
         self.doubted_sensors.clear();
         let mut variance = 0.0;
         for (at, sensor) in self.sensors.iter().enumerate() {
             let Some((fault, since_ns)) = sensor.fault else { continue };
-            // Nothing was ever read of it: the others are all there is.
-            let stand_in_c = expected[at].map(|expected| sensor.compute_stand_in(at_ns, expected));
+            // Nothing was ever read of it: the others are all there is. Without them nothing is known of this day.
+            let is_told = sensor.last_believed.is_some() || believed.iter().any(Option::is_some);
+            let stand_in_c = expected[at].filter(|_| is_told).map(|expected| sensor.compute_stand_in(at_ns, expected));
             self.doubted_sensors.push(DoubtedSensor { sensor: at, fault, since_ns, stand_in_c });
             let slope = self.model.as_ref().map_or(0.0, |model| model.slope_um_per_k(at));
             variance += stand_in_c.map_or(0.0, |stand_in| (slope * stand_in.sd).powi(2));
@@ -172,19 +173,19 @@ fn find_contradicted(model: &SensorModel, seen: &[Option<f64>], expected: &[Opti
 
 /// What is told of a sensor at one moment.
 #[derive(Debug, Clone, Copy)]
-struct Told {
+struct SensorLook {
     /// What it should show by the model, with what of the others is believed.
-    expected: Option<Estimate>,
-    /// Is another one believed? Otherwise `expected` is no more than the mean of the days of identification: a machine that was
+    expectation: Option<Estimate>,
+    /// Is another one believed? Otherwise `expectation` is no more than the mean of the days of identification: a machine that was
     /// switched on cold is far from it.
-    by_others: bool,
+    has_others: bool,
     /// Is it the one that the others contradict?
-    contradicted: bool,
+    is_worst: bool,
 }
 
 impl WatchedSensor {
-    fn judge_value(&mut self, at_ns: TimeNs, seen_c: Option<f64>, told: Told) {
-        let Told { expected, contradicted, .. } = told;
+    fn judge_value(&mut self, at_ns: TimeNs, seen_c: Option<f64>, look: SensorLook) {
+        let expected = look.expectation;
         let Some(value_c) = seen_c else {
             (self.near_since_ns, self.settled_since_ns, self.flat) = (None, None, None);
             self.fault.get_or_insert((SensorFault::Lost, at_ns));
@@ -195,12 +196,12 @@ impl WatchedSensor {
         }
         self.follow_flatness(at_ns, value_c, expected);
         if self.fault.is_some() {
-            self.judge_return(at_ns, value_c, told);
+            self.judge_return(at_ns, value_c, look);
             return;
         }
         let fault = match () {
             () if self.has_jumped(at_ns, value_c) => Some(SensorFault::Jumped),
-            () if contradicted => Some(SensorFault::Contradicted),
+            () if look.is_worst => Some(SensorFault::Contradicted),
             () if self.is_frozen(at_ns, expected) => Some(SensorFault::Frozen),
             () => None,
         };
@@ -275,11 +276,11 @@ impl WatchedSensor {
         }
     }
 
-    fn judge_return(&mut self, at_ns: TimeNs, value_c: f64, told: Told) {
+    fn judge_return(&mut self, at_ns: TimeNs, value_c: f64, look: SensorLook) {
         let Some((fault, _)) = self.fault else { return };
-        let expected = told.expected;
+        let expected = look.expectation;
         // Where all were lost for a while there is only what heat can do since then.
-        let against = expected.filter(|_| told.by_others || fault != SensorFault::Lost);
+        let against = expected.filter(|_| look.has_others || fault != SensorFault::Lost);
         let stand_in = against.map(|expected| self.compute_stand_in(at_ns, expected));
         let moves = fault != SensorFault::Frozen
             || self.flat.is_some_and(|flat| flat.looks <= 1.0)
