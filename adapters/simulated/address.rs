@@ -60,6 +60,8 @@ pub struct SimulatedTarget {
     pub speed_changes: bool,
     /// Does the controller deliver what the program is annotated with (depth of cut, diameter, operation)?
     pub annotations: bool,
+    /// Standard deviation of a gauge that measures the thermal error, um; 0: there is none.
+    pub gauge_um: f64,
     /// Flank wear of every edge at the start, mm.
     pub wear_mm: f64,
     /// The machine changes after so many hours; infinite when it never does.
@@ -99,6 +101,7 @@ pub fn parse_simulated(body: &str, keys: &mut Keys) -> Result<SimulatedTarget, N
         dropouts_per_h: keys.take_number("dropouts_per_h", 1.0, 0.0, 3600.0),
         speed_changes: keys.take_choice("speed_changes", &[("no", false), ("yes", true)]),
         annotations: keys.take_choice("annotations", &[("yes", true), ("no", false)]),
+        gauge_um: keys.take_number("gauge_um", 0.0, 0.0, 100.0),
         wear_mm: keys.take_number("wear_mm", 0.005, 0.0, 0.29),
         change_h: keys.take_number("change_h", f64::INFINITY, 0.0, 1e5),
         change_cut_pct: keys.take_number("change_cut_pct", 100.0, 10.0, 300.0),

@@ -19,6 +19,8 @@ enum Get {
     Number(fn(&Moment) -> f64),
     /// The actual speed, with the noise of its encoder.
     Speed,
+    /// The displacement of the tool by heat, with the noise of the gauge.
+    Gauge,
     Text(fn(&Panel) -> CachedText),
 }
 
@@ -82,6 +84,8 @@ const MILL_POSITION: [ChannelGetter; 2] = [
     ("y_axis_velocity_mm_min", Get::Number(|moment| round_to_tenth(moment.panel.velocity_mm_min[1]))),
 ];
 
+const GAUGE: [ChannelGetter; 1] = [("thermal_error_um", Get::Gauge)];
+
 const MILL_ANNOTATIONS: [ChannelGetter; 2] = [
     ("width_of_cut_mm", Get::Number(|moment| moment.panel.width_of_cut_mm)),
     ("teeth", Get::Number(|moment| moment.panel.teeth)),
@@ -118,8 +122,9 @@ impl SimulatedController {
         let device = PolledDevice::new(settings.controller, settings.seed, machine.origin_ns());
         let mill = settings.machine == SimulatedMachine::Mill;
         let mut entries = COMMON.to_vec();
-        let optional: [(bool, &[ChannelGetter]); 3] = [
+        let optional: [(bool, &[ChannelGetter]); 4] = [
             (settings.annotations, &ANNOTATIONS),
+            (settings.gauge_um > 0.0, &GAUGE),
             (mill, &MILL_POSITION),
             (mill && settings.annotations, &MILL_ANNOTATIONS),
         ];
@@ -139,18 +144,33 @@ impl SimulatedController {
         if !moment.panel.booted {
             return Err(SourceError::Off { source_name: self.name.clone() });
         }
-        let unrest_rpm = 0.6 * sample_normal(self.seed, Purpose::Speed, beat);
-        out.extend(self.outputs.iter_mut().map(|output| output.build_reading(&moment, unrest_rpm, stamp)));
+        let noise = SensorNoise {
+            speed_rpm: 0.6 * sample_normal(self.seed, Purpose::Speed, beat),
+            gauge_um: self.machine.settings().gauge_um * sample_normal(self.seed, Purpose::Gauge, beat),
+        };
+        out.extend(self.outputs.iter_mut().map(|output| output.build_reading(&moment, noise, stamp)));
         Ok(())
     }
 }
 
+/// What the sensors of the control add to the truth at one beat.
+#[derive(Debug, Clone, Copy)]
+struct SensorNoise {
+    speed_rpm: f64,
+    gauge_um: f64,
+}
+
 impl ControllerChannel {
-    fn build_reading(&mut self, moment: &Moment, unrest_rpm: f64, stamp: Stamp) -> Reading {
+    fn build_reading(&mut self, moment: &Moment, noise: SensorNoise, stamp: Stamp) -> Reading {
         match self.get {
             Get::Number(get) => Reading::from_number(self.channel, stamp, get(moment)),
             Get::Speed => {
-                Reading::from_number(self.channel, stamp, simulate_encoder(moment.panel.spindle_speed_rpm, unrest_rpm))
+                let speed_rpm = simulate_encoder(moment.panel.spindle_speed_rpm, noise.speed_rpm);
+                Reading::from_number(self.channel, stamp, speed_rpm)
+            }
+            Get::Gauge => {
+                let shown_um = round_to_tenth(moment.truth.thermal_error_um + noise.gauge_um);
+                Reading::from_number(self.channel, stamp, shown_um)
             }
             Get::Text(get) => Reading::from_text(self.channel, stamp, self.cache_text(get(&moment.panel))),
         }

@@ -18,6 +18,7 @@ pub(super) enum Purpose {
     Temperature,
     Speed,
     Voltage,
+    Gauge,
 }
 
 /// A well mixed word for (seed, purpose, index): the finaliser of SplitMix64 (Steele, Lea, Flood, OOPSLA 2014).

@@ -149,6 +149,8 @@ pub struct SimulatedSettings {
     pub speed_changes: bool,
     /// Does the controller deliver what the program is annotated with?
     pub annotations: bool,
+    /// Standard deviation of a gauge that measures the thermal error, um; 0: there is none.
+    pub gauge_um: f64,
     /// Flank wear of every edge at the start, mm.
     pub wear_mm: f64,
     /// What becomes of the machine later.
@@ -173,6 +175,7 @@ impl Default for SimulatedSettings {
             cut: CutLevel::Planned(1.0),
             speed_changes: false,
             annotations: true,
+            gauge_um: 0.0,
             wear_mm: FRESH_EDGE_MM,
             change: LaterChange { after_s: f64::INFINITY, cut: 1.0, friction: 1.0 },
             ladder: LadderSettings::default(),
@@ -247,6 +250,7 @@ impl SimulatedSettings {
             cut: CutLevel::Planned(target.cut_pct / 100.0),
             speed_changes: target.speed_changes,
             annotations: target.annotations,
+            gauge_um: target.gauge_um,
             wear_mm: target.wear_mm,
             change: LaterChange {
                 after_s: 3600.0 * target.change_h,

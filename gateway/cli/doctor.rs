@@ -1,5 +1,6 @@
 //! `cnc-gateway doctor ADDRESS`: who is there, what it answers, how long that takes, what is wrong and what to do next.
 
+use super::doctor_words::ReportWords;
 use super::lang::language;
 use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
 use crate::config;
@@ -7,10 +8,8 @@ use crate::doctor::{self, DoctorReport, SystemFiles};
 use crate::sinks::{self, SinkAddress};
 use adapters::Address;
 use adapters::address::AddressError;
-use adapters::channel::Channel;
 use adapters::driver::FactValue;
 use clap::Args;
-use rules::physics::explain::Language;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -84,10 +83,10 @@ fn examine_box(arguments: &DoctorArguments) -> CommandOutcome {
         for fact in &report.facts {
             let value = match &fact.value {
                 FactValue::Number(number) => number.to_string(),
-                FactValue::Text(text) => text.clone(),
+                FactValue::Text(text) => words.translate_phrases(text),
             };
             // Writing to a string does not fail.
-            let _ = writeln!(text, "  {}: {value}", fact.name);
+            let _ = writeln!(text, "  {}: {value}", words.translate_phrases(&fact.name));
         }
         for problem in &report.problems {
             let _ = writeln!(text, "{}", words.format_problem(&problem.what, &problem.next));
@@ -105,9 +104,24 @@ fn examine_sink(address: &str, json: bool) -> CommandResult {
     if json {
         print_json(&found.to_json(&address));
     } else {
-        print_text(&found.to_text(&address));
+        print_text(&format_sink(&address, &found));
     }
     Ok(to_outcome(found.error.is_none()))
+}
+
+/// Address, reachability, time and problem in lines for a person.
+fn format_sink(address: &SinkAddress, found: &sinks::doctor::SinkFinding) -> String {
+    let words = ReportWords(language());
+    let ms = found.connected_ms;
+    let Some(error) = &found.error else {
+        let well = format!("takes what the box sends; connected in {ms:.1} ms");
+        return format!(
+            "{address}\n  {}\n",
+            words.0.select_text(well, format!("可接收网关发送的内容；连接用时 {ms:.1} ms"))
+        );
+    };
+    let (what, next) = error.as_parts();
+    format!("{address}\n  {}\n{}\n", words.select("takes nothing", "不接收"), words.format_problem(what, next))
 }
 
 /// The address of the source of this name in a configuration.
@@ -153,26 +167,6 @@ fn write_offers(report: &DoctorReport, line: &mut impl FnMut(std::fmt::Arguments
         };
         let channel = offer.channel.map_or_else(String::new, |channel| format!(" -> {channel}"));
         line(format_args!("    {}{channel}: {says}", offer.name));
-    }
-}
-
-/// The words of the report, in the language of the command. What a device or a driver says stands as it was said.
-#[derive(Clone, Copy)]
-struct ReportWords(Language);
-
-impl ReportWords {
-    fn select(self, en: &'static str, zh: &'static str) -> &'static str {
-        self.0.select_text(en, zh)
-    }
-
-    fn format_problem(self, what: &str, next: &str) -> String {
-        let (problem, step) = (self.select("problem", "问题"), self.select("next", "处理"));
-        format!("  {problem}: {what}\n    {step}: {next}")
-    }
-
-    /// In Chinese beside its meaning: the name is what the configuration knows.
-    fn name_channel(self, channel: &'static Channel) -> String {
-        self.0.select_text(channel.name.to_owned(), format!("{} {}", channel.name, channel.zh))
     }
 }
 

@@ -13,6 +13,7 @@ mod devices;
 mod diagnose;
 mod diagnosis_child;
 mod doctor;
+mod doctor_words;
 mod effects;
 #[cfg(feature = "fleet")]
 mod fleet;

@@ -6,7 +6,9 @@
 //! and then with more friction in the spindle, which the twin has noticed and still tells. Their times are moved so that those
 //! days ended an hour before the start. What is known of the wear (`demo/wear.json`) is from one whole life of an edge and most of the
 //! next, 11,100 s of the same machine at `--speed max`; the edges then got the names that the machine gives to its first ones. The wear
-//! model counts only for the work material that it was learned with, which the recipe of the demonstration names. Faster than real time the machine works in shifts with short nights.
+//! model counts only for the work material that it was learned with, which the recipe of the demonstration names. The thermal law
+//! (`demo/thermal.json`) is what `identify thermal --model` made of four hours of this very address at `--speed max`, from
+//! a cold start, with the gauge that it has (`gauge_um=0.5`). Faster than real time the machine works in shifts with short nights.
 
 use crate::clock;
 use crate::config::Config;
@@ -33,6 +35,11 @@ const WORN: &str = include_str!("wear.json");
 const RECIPE: &str = include_str!("operations.toml");
 /// Cutting power over the wear, in the cuts of the short part.
 const WEAR: &str = include_str!("wear.toml");
+/// The thermal error over the temperatures.
+const THERMAL: &str = include_str!("thermal.json");
+
+/// The thermal law, in the data directory. Not `thermal.json`: that is what the law learns from readings.
+const THERMAL_FILE: &str = "demo-thermal.json";
 
 /// The recipe, in the data directory.
 const RECIPE_FILE: &str = "demo-operations.toml";
@@ -44,7 +51,9 @@ const DECADES_S: Range<f64> = 1.5e9..4e9;
 #[must_use]
 pub fn config_text(speed: MachineSpeed) -> String {
     let day = match speed {
-        MachineSpeed::Real => "day=short&begun_s=44&wear_mm=0.27&change_h=0&change_friction_pct=150&dropouts_per_h=0",
+        MachineSpeed::Real => {
+            "day=short&begun_s=44&wear_mm=0.27&change_h=0&change_friction_pct=150&dropouts_per_h=0&gauge_um=0.5"
+        }
         MachineSpeed::Times(_) | MachineSpeed::Max => "day=shifts",
     };
     format!("[gateway]\nname = \"Simulated lathe\"\n\n[[source]]\naddress = \"simulated://lathe?{day}\"\n")
@@ -61,6 +70,7 @@ pub fn install_data(config: &mut Config, speed: MachineSpeed) {
         Ok(()) => {
             config.twin.model = Some(data_dir.join("demo-lathe.toml"));
             config.operations.path.get_or_insert(data_dir.join(RECIPE_FILE));
+            config.thermal.model.get_or_insert(data_dir.join(THERMAL_FILE));
         }
         Err(error) => {
             let text = format!("the demonstration runs without its models: {error}");
@@ -101,6 +111,10 @@ fn write_models(data_dir: &Path, history: &Path) -> Result<(), FurnishError> {
     let recipe = data_dir.join(RECIPE_FILE);
     if !recipe.exists() {
         replace_file(&recipe, RECIPE)?;
+    }
+    let law = data_dir.join(THERMAL_FILE);
+    if !law.exists() {
+        replace_file(&law, THERMAL)?;
     }
     let known = history.exists() && Reader::open(history).and_then(|it| it.newest_wear_model()).is_ok_and(|id| id > 0);
     if !known {

@@ -4,7 +4,7 @@
 //! An estimate that is known to within watts has no tenths of a watt; a standard deviation is known to within a tenth of itself.
 //! Digits beyond that are noise, which no compression takes away: they were a third of the bytes of a tick.
 
-use gateway_history::{ExtraSeries, ExtraValue, STATE_SERIES};
+use gateway_history::{ExtraSeries, ExtraValue, STATE_SERIES, decimals_of_unit, round_to_decimals};
 use rules::estimators::{Estimated, Estimates, NoEstimate};
 use rules::script::Host;
 
@@ -14,6 +14,17 @@ const COUNT: usize = 14;
 const DEVIATION_STEP: f64 = 0.1;
 /// Numbers that are stored so.
 const DEVIATIONS: usize = 5;
+
+/// Estimates that are stored in whole watts.
+const WHOLE_WATTS: [&str; 7] = [
+    "no_load_power_w",
+    "no_load_power_sd_w",
+    "cutting_power_w",
+    "cutting_power_sd_w",
+    "visible_cutting_power_w",
+    "load_loss_w",
+    "wear_limit_w",
+];
 
 /// The series, in the order of `StoredEstimates::compute_values`.
 #[must_use]
@@ -40,6 +51,13 @@ pub fn list_series() -> Vec<ExtraSeries> {
         ExtraSeries::new_number("tool_parts_left", "1", "Parts until the edge is worn", "剩余可加工件数"),
         ExtraSeries::new_number("tool_parts_left_sd", "1", "Standard deviation of the parts left", "剩余件数标准差"),
     ]
+}
+
+/// The number that the history keeps of an estimate of this name and unit. Publish this one, and every view shows the same digits.
+#[must_use]
+pub fn round_as_stored(name: &str, unit: &str, number: f64) -> f64 {
+    let whole = WHOLE_WATTS.contains(&name).then_some(0);
+    round_to_decimals(number, whole.unwrap_or_else(|| decimals_of_unit(unit)))
 }
 
 /// What the history was given last, where it is given anew only when it has changed by enough.
@@ -117,6 +135,16 @@ mod tests {
             list_series().len(),
             StoredEstimates::default().compute_values(&Estimates::without_samples(0)).len()
         );
+    }
+
+    #[test]
+    fn a_published_estimate_has_the_digits_of_the_history() {
+        for series in list_series() {
+            let decimals = series.decimals.unwrap_or_else(|| decimals_of_unit(&series.unit));
+            let number = 1234.567_891_234_567;
+            let kept = round_to_decimals(number, decimals);
+            assert_eq!(round_as_stored(&series.name, &series.unit, number), kept, "{}", series.name);
+        }
     }
 
     #[test]

@@ -14,8 +14,8 @@ mod wear_news;
 
 pub use channels::Channels;
 pub use decide::{Decisions, ShownChange};
-pub use extras::list_series as stored_series;
 use extras::{StoredEstimates, list_script_series, own_value};
+pub use extras::{list_series as stored_series, round_as_stored};
 pub use journal::Journal;
 pub use part_detail::{OperationUse, PartDetail, ToolUse};
 pub use parts::CycleFollower;
@@ -50,7 +50,12 @@ pub trait Store {
 /// A notice as a row of the history.
 #[must_use]
 pub fn event_of(at_ns: TimeNs, source: &str, notice: &Notice) -> Event {
-    let detail = if notice.detail.is_empty() { String::new() } else { serde_json::json!(notice.detail).to_string() };
+    let detail = match serde_json::from_str::<serde_json::Value>(&notice.detail) {
+        // What is JSON already stays as it is: put into quotes once more, nobody who reads it finds its fields.
+        Ok(value) if value.is_object() || value.is_array() => notice.detail.clone(),
+        _ if notice.detail.is_empty() => String::new(),
+        _ => serde_json::json!(notice.detail).to_string(),
+    };
     Event { at_ns, kind: notice.code.to_owned(), source: source.to_owned(), text: notice.operator.clone(), detail }
 }
 
@@ -281,5 +286,25 @@ impl Pipeline {
     #[must_use]
     pub fn journal(&self) -> &Journal {
         &self.journal
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gateway_base::log::Severity;
+
+    #[test]
+    fn a_detail_that_is_json_is_stored_as_it_is_and_words_as_a_text() {
+        for (detail, stored) in [
+            (r#"{"by_ns":[1,1],"moves":[]}"#, r#"{"by_ns":[1,1],"moves":[]}"#),
+            ("[1]", "[1]"),
+            ("look at the cable", r#""look at the cable""#),
+            ("17", r#""17""#),
+            ("", ""),
+        ] {
+            let notice = Notice::new(Severity::Info, "kind", "text").with_detail(detail);
+            assert_eq!(event_of(7, "gateway", &notice).detail, stored);
+        }
     }
 }

@@ -4,8 +4,9 @@ use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::{Axis, ChannelId, Sample, Slot, Value};
 use gateway_config::GateMode;
 use gateway_gate::{Gate, GateOutcome, Verdict};
+use gateway_history::as_stored;
 use gateway_http::ESTIMATES;
-use gateway_pipeline::Pipeline;
+use gateway_pipeline::{Pipeline, round_as_stored};
 use gateway_sources::sample_feed::SampleFeed;
 use gateway_status::{
     AlarmStatus, AxisShift, ChannelStatus, DecisionStatus, EstimateStatus, GateStatus, NumberOrWord, OffsetStatus,
@@ -35,7 +36,8 @@ pub fn list_channels(sample: &Sample, feed: &SampleFeed) -> Vec<ChannelStatus> {
 
 fn build_channel_status(id: ChannelId, slot: &Slot, origin: Option<&str>) -> ChannelStatus {
     let (value, missing) = match &slot.value {
-        Ok(Value::Number(number)) => (Some(NumberOrWord::Number(*number)), None),
+        // The digits that the history keeps: every view shows one number.
+        Ok(Value::Number(number)) => (Some(NumberOrWord::Number(as_stored(id, *number))), None),
         Ok(Value::Text(text)) => (Some(NumberOrWord::Text(text.to_string())), None),
         Err(absence) => (None, Some(absence.as_word())),
     };
@@ -61,7 +63,7 @@ pub fn list_estimates(estimates: &Estimates) -> Vec<EstimateStatus> {
         let (value, missing) = (figure.ok(), figure.err());
         Some(EstimateStatus {
             name,
-            value,
+            value: value.map(|number| round_as_stored(name, unit_of(name), number)),
             uncertainty: None,
             unit: unit_of(name),
             missing: missing.map(NoEstimate::as_word),
@@ -78,11 +80,12 @@ fn unit_of(name: &str) -> &'static str {
 
 fn build_estimate_status(name: &'static str, estimated: Estimated) -> EstimateStatus {
     let (value, missing) = (estimated.ok(), estimated.err());
+    let unit = unit_of(name);
     EstimateStatus {
         name,
-        value: value.map(|estimate| estimate.value),
+        value: value.map(|estimate| round_as_stored(name, unit, estimate.value)),
         uncertainty: value.map(|estimate| HALF_INTERVAL * estimate.sd),
-        unit: unit_of(name),
+        unit,
         missing: missing.map(NoEstimate::as_word),
         why: missing.map(|reason| reason.to_string()),
     }

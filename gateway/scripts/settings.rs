@@ -216,9 +216,10 @@ pub fn told_changes(events: &[Event]) -> Vec<Value> {
     let mut newest_first: Vec<&Event> = events.iter().collect();
     newest_first.sort_by_key(|it| std::cmp::Reverse(it.at_ns));
     let change = |it: &&Event| {
-        // The detail of an event is JSON: here the text of the notice, which is JSON as well.
-        let text: String = serde_json::from_str(&it.detail).ok()?;
-        let mut detail: Map<String, Value> = serde_json::from_str(&text).ok()?;
+        let told: Value = serde_json::from_str(&it.detail).ok()?;
+        // Earlier versions put the JSON of a notice into a text once more.
+        let told = if let Value::String(text) = told { serde_json::from_str(&text).ok()? } else { told };
+        let Value::Object(mut detail) = told else { return None };
         detail.insert("at_ms".to_owned(), json!(it.at_ns / 1_000_000));
         Some(Value::Object(detail))
     };

@@ -48,16 +48,4 @@ impl SinkFinding {
             "problems": self.error.iter().map(problem).collect::<Vec<_>>(),
         })
     }
-
-    /// The same in lines for a person.
-    #[must_use]
-    pub fn to_text(&self, address: &SinkAddress) -> String {
-        match &self.error {
-            None => format!("{address}\n  takes what the box sends; connected in {:.1} ms\n", self.connected_ms),
-            Some(error) => {
-                let (what, next) = error.as_parts();
-                format!("{address}\n  takes nothing\n  problem: {what}\n    next: {next}\n")
-            }
-        }
-    }
 }

@@ -24,14 +24,22 @@ const UNITS = { um: "µm", "cm3/min": "cm³/min", rpm: "min⁻¹", degC: "°C", 
 
 export const unitName = (unit) => (unit === "rpm" ? t("rpm") : (UNITS[unit] ?? unit ?? ""));
 
+/** Decimal places of a value in this unit. */
+function placesOf(value, unit) {
+  const size = Math.abs(value);
+  if (unit === "W" && size < 10 && size > 0) return 1;
+  if (unit === "mm" && size >= 10) return 1;
+  return PLACES[unit] ?? (size >= 100 ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : 3);
+}
+
+/** The number that is read where this value is printed: what adds up on the page adds up in these. */
+export const printed = (value, unit) => Number(value.toFixed(placesOf(value, unit)));
+
 /** A number without its unit. */
 export function number(value, unit) {
   if (typeof value !== "number" || !Number.isFinite(value)) return "–";
-  const size = Math.abs(value);
-  let places = PLACES[unit] ?? (size >= 100 ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : 3);
-  if (unit === "W" && size < 10 && size > 0) places = 1;
-  if (unit === "mm" && size >= 10) places = 1;
-  const shown = Number(value.toFixed(places));
+  const places = placesOf(value, unit);
+  const shown = printed(value, unit);
   return (Object.is(shown, -0) ? 0 : shown).toLocaleString(locale(), {
     maximumFractionDigits: places,
     minimumFractionDigits: Number.isInteger(value) && unit !== "°C" ? 0 : places,

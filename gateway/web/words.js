@@ -51,7 +51,8 @@ export const own = (thing) => localTimes(thing?.[chosen] ?? thing?.en ?? "");
     phrases. */
 export function box(text) {
   if (chosen !== "zh" || !text) return localTimes(text);
-  return PHRASES.reduce((done, [en, zh]) => done.split(en).join(zh), localTimes(text));
+  const ranges = localTimes(text).replace(/(\d) to (-?\d)/g, "$1 至 $2");
+  return PHRASES.reduce((done, [en, zh]) => done.split(en).join(zh), ranges);
 }
 
 export function setLanguage(next) {

@@ -3,11 +3,13 @@
 //!
 //! Code blocks are looked at as they stand: fenced ones, and those that are indented by four spaces.
 
+mod chinese;
 mod commands;
 mod documents;
 mod driver;
 mod effect;
 mod identifiers;
+mod pictures;
 mod run;
 mod settings;
 
@@ -85,10 +87,6 @@ fn the_readme_is_one_page() {
     assert!(lines <= 100, "{lines} lines: what does not help to decide in a minute belongs into the handbook");
 }
 
-/// What integrators and machinists read.
-const BOTH_LANGUAGES: [&str; 10] =
-    ["start", "sources", "configuration", "page", "rules", "gate", "access", "mismatch", "fanuc", "recordings"];
-
 /// Sections, blocks of code and tables of a chapter, in their order.
 fn shape(text: &str) -> Vec<String> {
     let mut shape = Vec::new();
@@ -111,22 +109,18 @@ fn shape(text: &str) -> Vec<String> {
 #[test]
 fn chapters_for_the_shop_are_there_in_chinese_section_by_section() {
     let mut wrong = Vec::new();
-    for topic in BOTH_LANGUAGES {
-        let found = find_chapter(topic).expect("a chapter");
-        match found.zh {
-            None => wrong.push(format!("{topic}: not in Chinese (gateway/handbook/zh/{topic}.md)")),
-            Some(zh) => {
-                let (own, other) = (shape(found.text), shape(zh));
-                if own != other {
-                    let at = own.iter().zip(&other).position(|(a, b)| a != b).unwrap_or(own.len().min(other.len()));
-                    wrong.push(format!(
-                        "{topic}: the Chinese text differs from part {} on: {:?} for {:?}",
-                        at + 1,
-                        other.get(at),
-                        own.get(at)
-                    ));
-                }
-            }
+    for found in CHAPTERS {
+        let Some(zh) = found.zh else { continue };
+        let (own, other) = (shape(found.text), shape(zh));
+        if own != other {
+            let at = own.iter().zip(&other).position(|(a, b)| a != b).unwrap_or(own.len().min(other.len()));
+            wrong.push(format!(
+                "{}: the Chinese text differs from part {} on: {:?} for {:?}",
+                found.topic,
+                at + 1,
+                other.get(at),
+                own.get(at)
+            ));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));

@@ -239,10 +239,17 @@ pub fn parse_nested_json(mut fields: Json) -> Json {
         let Some(Json::String(text)) = fields.get(name) else { continue };
         let nested = if text.is_empty() { Some(Json::Null) } else { serde_json::from_str(text).ok() };
         if let Some(nested) = nested {
-            fields[name] = nested;
+            fields[name] = unwrap_text(nested);
         }
     }
     fields
+}
+
+/// The object or list in a text that holds one: earlier versions put the JSON of a notice into a text once more.
+fn unwrap_text(value: Json) -> Json {
+    let Json::String(text) = &value else { return value };
+    let inner: Option<Json> = serde_json::from_str(text).ok();
+    inner.filter(|it| it.is_object() || it.is_array()).unwrap_or(value)
 }
 
 /// Is this a record that leaves the box? The audit, commands and models stay where they can be verified.
@@ -257,4 +264,19 @@ pub(super) fn is_deliverable(record: &Record) -> bool {
             | Record::Decision(_)
             | Record::Diagnosis(_)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_in_a_text_is_json_even_where_it_was_put_into_a_text_twice() {
+        let told = json!({ "moves": [1] });
+        for detail in [told.to_string(), json!(told.to_string()).to_string()] {
+            assert_eq!(parse_nested_json(json!({ "detail": detail }))["detail"], told);
+        }
+        let words = json!("look at the cable").to_string();
+        assert_eq!(parse_nested_json(json!({ "detail": words }))["detail"], "look at the cable");
+    }
 }

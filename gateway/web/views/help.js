@@ -9,7 +9,7 @@ export function mount(root, context) {
   const search = make("input", "", null, { type: "search", placeholder: t("search"), "aria-label": t("search") });
   root.append(
     make("div", "help", [
-      make("div", "card", [search, language() === "en" ? null : make("p", "note", t("handbook_english")), menu]),
+      make("div", "card", [search, menu]),
       text,
     ]),
   );
@@ -44,12 +44,15 @@ export function mount(root, context) {
     }
     for (const link of menu.querySelectorAll("a")) link.toggleAttribute("aria-current", link.dataset.chapter === name);
   };
+  // A chapter for developers that is not written in Chinese is told as one in the list.
+  const english = (name) =>
+    language() === "en" || chapters.get(name).zh ? null : make("small", "note", ` · ${t("in_english")}`);
   const list = (names) =>
     fill(
       menu,
       names.length
         ? names.map((name) =>
-            make("a", "", chapters.get(name).title, {
+            make("a", "", [chapters.get(name).title, english(name)], {
               href: `/help?chapter=${name}`,
               "data-chapter": name,
               onclick: (event) => {
@@ -68,7 +71,7 @@ export function mount(root, context) {
   });
   ask(`/api/v1/handbook/index?lang=${language()}`)
     .then((found) => {
-      for (const { name, title } of found.chapters) chapters.set(name, { title, text: null });
+      for (const { name, title, zh } of found.chapters) chapters.set(name, { title, zh, text: null });
       list([...chapters.keys()]);
       const asked = new URLSearchParams(location.search).get("chapter");
       const first = chapters.has(asked) ? asked : chapters.keys().next().value;

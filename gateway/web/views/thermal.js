@@ -8,6 +8,9 @@ import { columns, resolutionFor } from "/web/history-data.js";
 
 const TEMPERATURE = /(_temperature_c|^temperature_\d+_c)$/;
 const SPAN_S = 8 * 3600;
+/** A figure of fewer seconds is a dot. Until then it is read anew every second or so, afterwards every twenty. */
+const FIGURE_S = 10;
+const [READ_MS, READ_EARLY_MS] = [20000, 1500];
 
 export function mount(root, context) {
   const now = make("div", "");
@@ -15,12 +18,14 @@ export function mount(root, context) {
   const error = make("div", "plot-box");
   const warmth = make("div", "plot-box");
   const note = make("p", "note", " ");
+  const collecting = make("p", "note", "", { hidden: true });
   const list = make("div", "legend");
   const points = make("div", "");
   root.append(
     make("div", "columns", [card(t("thermal_now"), now, "ages"), card(t("thermal_offsets"), offsets, "ages")]),
     card("", [
       make("div", "head", [make("h2", "", t("thermal_error_figure")), make("span", "note", t("last_eight_hours"))]),
+      collecting,
       error,
       note,
     ]),
@@ -29,6 +34,7 @@ export function mount(root, context) {
   );
   drawPoints(points, context);
   let plots = [];
+  let early = true;
   const read = async () => {
     const status = context.status();
     if (!status) return;
@@ -44,6 +50,9 @@ export function mount(root, context) {
       // A history of seconds has no whole minute yet.
       const there = Math.min(SPAN_S, Math.max(0, (status.at_ms - stored.first_ms) / 1000));
       const resolution = Number.isFinite(there) ? resolutionFor(there) : 0;
+      early = !(there >= FIGURE_S);
+      collecting.hidden = !early;
+      if (early) say(collecting, t("thermal_collecting", Math.floor(there || 0), FIGURE_S));
       const found = await ask(
         `/api/v1/samples?from=${from}&to=${to}&channels=${names.join(",")}&resolution_s=${resolution}`,
       );
@@ -113,13 +122,17 @@ export function mount(root, context) {
       }),
     );
   };
-  const timer = setInterval(read, 20000);
+  let timer = null;
+  const again = async () => {
+    await read();
+    if (timer !== false) timer = setTimeout(again, early ? READ_EARLY_MS : READ_MS);
+  };
   let begun = false;
   return {
     update(status) {
       if (!begun) {
         begun = true;
-        read();
+        again();
       }
       fill(
         now,
@@ -145,7 +158,8 @@ export function mount(root, context) {
       );
     },
     leave() {
-      clearInterval(timer);
+      clearTimeout(timer);
+      timer = false;
       plots.forEach((plot) => plot.destroy());
     },
   };

@@ -1,7 +1,7 @@
 // Twin: the machine beside its simulation. What is watched, what differs, what the latest diagnosis says, what to try
 // next.
 import { ask, card, fill, make, row, say } from "/web/parts.js";
-import { clock, number, quantity, when } from "/web/format.js";
+import { clock, number, printed, quantity, when } from "/web/format.js";
 import { box, own, t } from "/web/words.js";
 import { TimePlot, drawnFrom } from "/web/plot.js";
 import { columns } from "/web/history-data.js";
@@ -152,6 +152,14 @@ export function mount(root, context) {
   };
 }
 
+/** Recorded less simulated, as the two are printed; the difference of the box where one of them is missing. */
+export function printedDifference(twin) {
+  const parts = [twin.twin_recorded, twin.twin_expected];
+  if (!parts.every((it) => typeof it === "number")) return twin.twin_residual;
+  const [recorded, simulated] = parts.map((it) => printed(it, twin.unit));
+  return Number((recorded - simulated).toFixed(3));
+}
+
 function drawNow(verdict, facts, regimes, status, context) {
   const twin = status.twin;
   if (!twin) {
@@ -173,7 +181,8 @@ function drawNow(verdict, facts, regimes, status, context) {
   fill(facts, [
     row(t("recorded_value"), value(twin.twin_recorded)),
     row(t("simulated_value"), value(twin.twin_expected)),
-    row(t("twin_residual"), value(twin.twin_residual), twin.missing ? context.reason(twin.missing) : second),
+    // The difference of what is printed: figures that were rounded one by one are off by one.
+    row(t("twin_residual"), value(printedDifference(twin)), twin.missing ? context.reason(twin.missing) : second),
     row(t("model"), twin.model, twin.file),
     twin.problem ? row(t("model_refused"), "", box(twin.problem), { dot: "bad", tone: "bad" }) : null,
     twin.diagnosing_since_ms

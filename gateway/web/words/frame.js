@@ -44,10 +44,7 @@ export const FRAME = {
   d: ["d", "天"],
   rpm: ["rpm", "r/min"],
   // help
-  handbook_english: [
-    "The chapters for installing and operating the box are in Chinese, too.",
-    "集成与操作所需章节为中文，其余章节为英文。",
-  ],
+  in_english: ["in English", "英文"],
   chapters: ["Chapters", "章节"],
   no_chapter: ["This chapter is not part of this box.", "无此章节。"],
   table: ["Table", "表格"],

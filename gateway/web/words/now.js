@@ -21,6 +21,8 @@ export const NOW = {
   short_no_load_power_w: ["No-load", "空载"],
   short_load_loss_w: ["Load loss", "附加损耗"],
   short_cutting_power_w: ["Cutting", "切削"],
+  short_rest_w: ["Rest", "其余"],
+  rest_is: ["what the parts leave", "各分项之外"],
   loss_not_commissioned: ["{0}: load loss not commissioned", "{0}：附加损耗未标定"],
   programmed: ["programmed {0}", "编程值 {0}"],
   value_age: ["{0} old", "{0} 前的数据"],

@@ -83,6 +83,12 @@ impl Browser {
         answer["data"].as_str().expect("base64").to_owned()
     }
 
+    /// A picture of what the window shows, as PNG.
+    pub(crate) fn picture_of_window(&mut self) -> String {
+        let answer = self.call("Page.captureScreenshot", &json!({ "format": "png" }));
+        answer["data"].as_str().expect("base64").to_owned()
+    }
+
     /// What has gone wrong in the page since this was last asked: exceptions, errors of the console, answers that are not 2xx
     /// or 3xx, requests to anything but `address`.
     pub(crate) fn faults(&mut self, address: &str) -> Vec<String> {

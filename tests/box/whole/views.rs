@@ -9,7 +9,7 @@ use std::time::Duration;
 use testkit::process::{Gateway, get, wait_for};
 
 /// Every view, with an expression that is true when it has drawn what it shows.
-const VIEWS: [(&str, &str); 8] = [
+const VIEWS: [(&str, &str); 10] = [
     ("now", "document.querySelector('.trend .uplot canvas')"),
     ("history", "document.getElementById('main').dataset.drawnMs"),
     ("wear", "document.querySelector('.lamp')?.textContent.length > 2"),
@@ -17,6 +17,8 @@ const VIEWS: [(&str, &str); 8] = [
     ("twin", "document.querySelector('.verdict')?.textContent.length > 2"),
     ("rules", "document.querySelector('.editor-host')?.shadowRoot?.querySelector('.cm-line')"),
     ("audit", "document.querySelector('main table, main .empty')"),
+    ("box", "document.querySelectorAll('main .card .row').length > 3"),
+    ("setup", "document.querySelector('main .card')?.textContent.length > 20"),
     ("help", "document.querySelector('.handbook h1')"),
 ];
 
@@ -49,7 +51,7 @@ pub(super) fn barriers(browser: &mut Browser, axe: &str) -> Vec<String> {
 /// Words on the page that no reader should see.
 const STRAY: [&str; 5] = ["undefined", "NaN", "[object", "null", "Infinity"];
 
-fn base64(text: &str) -> Vec<u8> {
+pub(super) fn base64(text: &str) -> Vec<u8> {
     let value = |c: u8| match c {
         b'A'..=b'Z' => Some(c - b'A'),
         b'a'..=b'z' => Some(c - b'a' + 26),
@@ -141,20 +143,46 @@ fn every_view_in_every_way() {
     every_view(&ways);
 }
 
+/// `CNC_GATEWAY_PICTURES=/tmp/pictures cargo test --test box forty_pictures -- --ignored`
+#[test]
+#[ignore = "4 minutes: forty pictures of the demonstration at its own pace, for a person to look at"]
+fn forty_pictures_of_the_demonstration() {
+    if !browser::is_there() {
+        return;
+    }
+    let mut ways = Vec::new();
+    for language in ["en", "zh"] {
+        ways.extend([390, 1440].map(|width| (language, width, "light")));
+    }
+    let directory = tempfile::tempdir().expect("a directory");
+    let mut gateway = Gateway::start(&directory.path().join("data"), &[]);
+    let address = gateway.address();
+    wait_for("the worn edge", Duration::from_secs(120), || {
+        let alarms = get(&address, "/api/v1/status").json()["alarms"].to_string();
+        alarms.contains("tool_worn").then_some(())
+    });
+    look_at_all(&ways, directory.path(), &address);
+    gateway.stop();
+}
+
 fn every_view(ways: &[(&str, u32, &str)]) {
     if !browser::is_there() {
         return;
     }
-    let axe = axe();
     let directory = tempfile::tempdir().expect("a directory");
     let (gateway, address) = started(directory.path());
-    let mut browser = Browser::start(directory.path());
+    look_at_all(ways, directory.path(), &address);
+    gateway.stop();
+}
+
+fn look_at_all(ways: &[(&str, u32, &str)], directory: &Path, address: &str) {
+    let axe = axe();
+    let mut browser = Browser::start(directory);
     for view in VIEWS {
         for way in ways {
-            look(&mut browser, &address, axe.as_deref(), view, *way);
+            look(&mut browser, address, axe.as_deref(), view, *way);
         }
     }
-    gateway.stop();
 }
 
 /// What the address says is looked at, in seconds.

@@ -1,6 +1,6 @@
 // Now: where the power of the spindle goes, at this moment and in the last ten minutes.
 import { ask, make, say } from "/web/parts.js";
-import { number, quantity as shown } from "/web/format.js";
+import { number, printed, quantity as shown } from "/web/format.js";
 import { t } from "/web/words.js";
 import { TimePlot, drawnFrom } from "/web/plot.js";
 import { StateRibbon } from "/web/ribbon.js";
@@ -19,19 +19,18 @@ const PARTS = ["no_load_power_w", "load_loss_w", "cutting_power_w"];
 /** What the load loss of the drive enters. */
 const LOSSY = new Set(["load_loss_w", "cutting_power_w"]);
 
-/** The parts of the power, W, in whole watts that add up to `total`; or the word for why they are withheld. */
+/** The parts of the power, W, and the rest, which add up to the power that is printed; or the word for why they are withheld. */
 export function split(quantity) {
+  const none = { watts: null, rest: null, why: null };
   const found = PARTS.map((key) => quantity(key));
   const without = found.find((it) => !it || it.missing || typeof it.value !== "number");
   const power = quantity("spindle_power_w");
-  if (without !== undefined || !power || power.missing) return { total: null, watts: null, why: null };
+  if (without !== undefined || !power || power.missing) return none;
   const watts = found.map((it) => Math.round(it.value));
-  const total = watts.reduce((sum, it) => sum + it, 0);
+  const rest = Number((printed(power.value, "W") - watts.reduce((sum, it) => sum + it, 0)).toFixed(1));
   const sd = Math.hypot(...found.map((it) => it.uncertainty ?? 0));
   const within = Math.max(SAME_MOMENT_SHARE * Math.abs(power.value), SAME_MOMENT_SD * sd, 5);
-  return Math.abs(total - power.value) <= within
-    ? { total, watts, why: null }
-    : { total: null, watts: null, why: "parts_of_another_moment" };
+  return Math.abs(rest) <= within ? { watts, rest, why: null } : { ...none, why: "parts_of_another_moment" };
 }
 
 /** Where the spindle's power goes, as one strip: no-load, loss under load, cutting; what cannot be told apart is one
@@ -46,8 +45,14 @@ export function strip() {
     "div",
     "power-list",
     labels.map(({ key, value, note }) =>
-      make("div", `power-label ${key}`, [make("span", "", t(`short_${key}`)), value, note]),
+      make("div", `power-label ${key}`, [make("span", "", t(`short_${key}`)), value, note], { "data-part": key }),
     ),
+  );
+  const rest = make("b", "", "–");
+  list.append(
+    make("div", "power-label rest", [make("span", "", t("short_rest_w")), rest, make("span", "more", t("rest_is"))], {
+      "data-part": "rest",
+    }),
   );
   const section = make("section", "card power ages", [
     make("div", "head", [
@@ -69,9 +74,8 @@ export function strip() {
     const power = Math.max(0, value("spindle_power_w") ?? 0);
     greatest = Math.max(greatest * 0.9995, power, 500);
     const turning = Math.abs(value("spindle_speed_rpm") ?? 0) > 1;
-    const { total: sum, watts: parts, why } = split(context.quantity);
-    // What stands above the parts is what they add up to: a reader does the sum.
-    if (sum !== null) say(total, number(sum, "W"));
+    const { watts: parts, rest: left, why } = split(context.quantity);
+    say(rest, left === null ? "–" : shown(left, "W"));
     let used = 0;
     PARTS.forEach((_, at) => {
       const watts = turning && parts ? Math.min(Math.max(0, parts[at]), Math.max(0, power - used)) : 0;

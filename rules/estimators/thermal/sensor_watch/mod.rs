@@ -135,14 +135,17 @@ impl SensorWatch {
             .collect();
         let worst = self.model.as_ref().and_then(|model| find_contradicted(model, &seen, &expected));
         for (at, sensor) in self.sensors.iter_mut().enumerate() {
-            sensor.judge_value(at_ns, seen[at], expected[at], worst == Some(at));
+            let others = believed.iter().enumerate().any(|(other, value)| other != at && value.is_some());
+            let look = SensorLook { expectation: expected[at], has_others: others, is_worst: worst == Some(at) };
+            sensor.judge_value(at_ns, seen[at], look);
         }
         self.doubted_sensors.clear();
         let mut variance = 0.0;
         for (at, sensor) in self.sensors.iter().enumerate() {
             let Some((fault, since_ns)) = sensor.fault else { continue };
-            // Nothing was ever read of it: the others are all there is.
-            let stand_in_c = expected[at].map(|expected| sensor.compute_stand_in(at_ns, expected));
+            // Nothing was ever read of it: the others are all there is. Without them nothing is known of this day.
+            let is_told = sensor.last_believed.is_some() || believed.iter().any(Option::is_some);
+            let stand_in_c = expected[at].filter(|_| is_told).map(|expected| sensor.compute_stand_in(at_ns, expected));
             self.doubted_sensors.push(DoubtedSensor { sensor: at, fault, since_ns, stand_in_c });
             let slope = self.model.as_ref().map_or(0.0, |model| model.slope_um_per_k(at));
             variance += stand_in_c.map_or(0.0, |stand_in| (slope * stand_in.sd).powi(2));
@@ -168,21 +171,37 @@ fn find_contradicted(model: &SensorModel, seen: &[Option<f64>], expected: &[Opti
     (others_agree && worst.1 > CONTRADICTS_SD && worst.2 > CONTRADICTS_K).then_some(worst.0)
 }
 
+/// What is told of a sensor at one moment.
+#[derive(Debug, Clone, Copy)]
+struct SensorLook {
+    /// What it should show by the model, with what of the others is believed.
+    expectation: Option<Estimate>,
+    /// Is another one believed? Otherwise `expectation` is no more than the mean of the days of identification: a machine that was
+    /// switched on cold is far from it.
+    has_others: bool,
+    /// Is it the one that the others contradict?
+    is_worst: bool,
+}
+
 impl WatchedSensor {
-    fn judge_value(&mut self, at_ns: TimeNs, seen_c: Option<f64>, expected: Option<Estimate>, contradicted: bool) {
+    fn judge_value(&mut self, at_ns: TimeNs, seen_c: Option<f64>, look: SensorLook) {
+        let expected = look.expectation;
         let Some(value_c) = seen_c else {
             (self.near_since_ns, self.settled_since_ns, self.flat) = (None, None, None);
             self.fault.get_or_insert((SensorFault::Lost, at_ns));
             return;
         };
+        if self.begins_anew(at_ns) {
+            self.fault = None;
+        }
         self.follow_flatness(at_ns, value_c, expected);
         if self.fault.is_some() {
-            self.judge_return(at_ns, value_c, expected);
+            self.judge_return(at_ns, value_c, look);
             return;
         }
         let fault = match () {
             () if self.has_jumped(at_ns, value_c) => Some(SensorFault::Jumped),
-            () if contradicted => Some(SensorFault::Contradicted),
+            () if look.is_worst => Some(SensorFault::Contradicted),
             () if self.is_frozen(at_ns, expected) => Some(SensorFault::Frozen),
             () => None,
         };
@@ -190,6 +209,13 @@ impl WatchedSensor {
             Some(fault) => self.doubt_sensor(fault, at_ns),
             None => self.last_believed = Some(Believed { at_ns, value_c, expected_c: expected.map(|it| it.value) }),
         }
+    }
+
+    /// A sensor that was only away, and of which nothing was believed so far or for so long that the rate says nothing, is judged as at its
+    /// first value: its source may answer a tick after the others, and a machine that was off overnight is cold in all of its parts.
+    fn begins_anew(&self, at_ns: TimeNs) -> bool {
+        let lost = matches!(self.fault, Some((SensorFault::Lost, _)));
+        lost && self.last_believed.is_none_or(|before| at_ns - before.at_ns > RATE_WITHIN_NS)
     }
 
     fn doubt_sensor(&mut self, fault: SensorFault, at_ns: TimeNs) {
@@ -250,9 +276,12 @@ impl WatchedSensor {
         }
     }
 
-    fn judge_return(&mut self, at_ns: TimeNs, value_c: f64, expected: Option<Estimate>) {
+    fn judge_return(&mut self, at_ns: TimeNs, value_c: f64, look: SensorLook) {
         let Some((fault, _)) = self.fault else { return };
-        let stand_in = expected.map(|expected| self.compute_stand_in(at_ns, expected));
+        let expected = look.expectation;
+        // Where all were lost for a while there is only what heat can do since then.
+        let against = expected.filter(|_| look.has_others || fault != SensorFault::Lost);
+        let stand_in = against.map(|expected| self.compute_stand_in(at_ns, expected));
         let moves = fault != SensorFault::Frozen
             || self.flat.is_some_and(|flat| flat.looks <= 1.0)
             || self.near_since_ns.is_some();

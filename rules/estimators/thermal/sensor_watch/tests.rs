@@ -174,6 +174,35 @@ fn a_sensor_that_comes_back_is_believed_again() {
     assert!(!doubted_at.iter().any(|(_, at_s)| (4200..6000).contains(at_s)), "{doubted_at:?}");
 }
 
+/// Sources answer one after the other, at the start and after a night in which the machine was off: nobody is doubted for it, and what
+/// they show is what counts.
+#[test]
+fn sensors_that_come_one_after_the_other_are_believed_from_their_first_value() {
+    for (off_s, air_c) in [(60, 20.0), (12 * 3600, 14.0), (12 * 3600, 30.0)] {
+        let mut watch = SensorWatch::new(SensorModel::from_law(&law(), &NAMES), NAMES.len());
+        let mut at_s = 0;
+        for (morning, day_air_c) in [(1, 20.0), (2, air_c)] {
+            for (step, true_c) in day(50 + morning, day_air_c, 3).iter().enumerate() {
+                at_s += STEP_S as i64;
+                let come = |sensor: usize| step >= 2 * sensor;
+                let seen: Vec<_> =
+                    (0..3).map(|it| if come(it) { Ok(true_c[it]) } else { Err(Absence::NotYetRead) }).collect();
+                let mut temperatures = seen.clone();
+                watch.replace_doubted(at_s * SECOND_NS, &mut temperatures);
+                let doubted: Vec<usize> = watch.list_doubted().iter().map(|it| it.sensor).collect();
+                // After a minute they are cold at once, which no heat explains: only a night does.
+                if morning == 1 || off_s > 600 {
+                    assert!(doubted.iter().all(|it| !come(*it)), "{off_s} {air_c} {morning} {step}: {doubted:?}");
+                    let same = (0..3).filter(|it| come(*it)).all(|it| temperatures[it] == seen[it]);
+                    assert!(same, "{off_s} {air_c} {morning} {step}: {temperatures:?}");
+                }
+            }
+            at_s += off_s;
+            watch.replace_doubted(at_s * SECOND_NS, &mut [Err(Absence::MachineOff); 3]);
+        }
+    }
+}
+
 #[test]
 fn a_law_that_does_not_tell_has_no_model() {
     let mut law = law();
