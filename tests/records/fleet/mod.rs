@@ -8,6 +8,7 @@ mod cluster;
 mod killed;
 mod means;
 mod monitoring;
+mod panels;
 mod partitions;
 mod pipeline;
 mod poison;
