@@ -13,6 +13,8 @@ const VERSION: i32 = 3;
 pub const TABLES: &str = concat!(include_str!("schema/tables.sql"), include_str!("schema/clock_moves.sql"));
 /// The views and functions.
 pub const VIEWS: &str = include_str!("schema/views.sql");
+/// Settings of the database, at every start: one that was made by an earlier version has them, too.
+const SETTINGS: &str = include_str!("schema/settings.sql");
 /// Records of a batch into their tables.
 pub(super) const RECORDS: &str = include_str!("schema/records.sql");
 /// From version 1: what makes room for the new tables, and what fills them.
@@ -174,6 +176,7 @@ pub(super) async fn bring_up(client: &mut Client) -> Result<Partitioning, NatsEr
             return Err(NatsError::new(what, "use the newer program that has made them"));
         }
     }
+    transaction.batch_execute(SETTINGS).await.map_err(creating)?;
     transaction.commit().await.map_err(creating)?;
     Ok(partitioning)
 }

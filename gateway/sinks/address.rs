@@ -1,5 +1,6 @@
 //! Addresses of sinks: the notation of sources, with schemes of their own.
 
+use super::mail::MailTarget;
 use super::mqtt::MqttTarget;
 use super::nats::NatsSinkTarget;
 #[cfg(feature = "opcua")]
@@ -16,13 +17,15 @@ use std::str::FromStr;
 use thiserror::Error;
 
 /// The schemes of the notation, each with how an address of it is written.
-pub const SCHEMES: [(&str, &str); 11] = [
+pub const SCHEMES: [(&str, &str); 13] = [
     ("mqtt", "mqtt://BROKER:1883/PREFIX"),
     ("mqtts", "mqtts://BROKER:8883/PREFIX"),
     ("nats", "nats://SERVER:4222,SERVER:4222/PREFIX"),
     ("natss", "natss://SERVER:4222,SERVER:4222/PREFIX"),
     ("opcua", "opcua://0.0.0.0:4840?user=USER&password_file=FILE"),
     ("parquet", "parquet:DIRECTORY"),
+    ("smtp", "smtp://HOST:25?from=ADDRESS&to=ADDRESS,ADDRESS"),
+    ("smtps", "smtps://HOST:465?from=ADDRESS&to=ADDRESS,ADDRESS"),
     ("sparkplug", "sparkplug://BROKER:1883/GROUP/NODE/DEVICE"),
     ("shdr", "shdr://0.0.0.0:7878"),
     ("sparkplugs", "sparkplugs://BROKER:8883/GROUP/NODE/DEVICE"),
@@ -33,6 +36,8 @@ pub const SCHEMES: [(&str, &str); 11] = [
 /// What an address means. Each variant belongs to one kind of sink.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SinkTarget {
+    /// Alarms as mails.
+    Mail(MailTarget),
     /// JSON documents on plain topics.
     Mqtt(MqttTarget),
     /// A stream of NATS JetStream.
@@ -74,6 +79,7 @@ impl SinkAddress {
     #[must_use]
     pub fn find_file_problems(&self) -> Vec<(String, String)> {
         match &self.target {
+            SinkTarget::Mail(target) => target.find_file_problems(),
             SinkTarget::Mqtt(target) => target.broker.find_file_problems(),
             SinkTarget::Nats(target) => target.target.check_files(),
             #[cfg(feature = "opcua")]
@@ -173,6 +179,18 @@ pub(super) enum TargetError {
     /// Nobody could tell who has sent an alarm.
     #[error("write secret_file=FILE: its first line is the secret that messages are signed with")]
     NoSecret,
+    /// Mails come from nobody.
+    #[error("write from=ADDRESS: whom the mail server lets send")]
+    NoSender,
+    /// Mails go to nobody.
+    #[error("write to=ADDRESS or to=ADDRESS,ADDRESS: who gets the alarms")]
+    NoRecipient,
+    /// What is written is no address of mail.
+    #[error("{text:?} is no mail address; write one such as shop@works.example, and a list with commas")]
+    Mailbox { text: String },
+    /// A list that belongs to the mail server.
+    #[error("{count} recipients are more than {most}; make a list at the mail server")]
+    TooManyRecipients { count: usize, most: usize },
     /// A server that lets nobody in.
     #[cfg(feature = "opcua")]
     #[error("nobody could sign in: write user= and password_file=, or anonymous=yes")]
@@ -188,6 +206,7 @@ fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, Target
         #[cfg(not(feature = "opcua"))]
         "opcua" => Err(without_opcua(keys)),
         "parquet" => ParquetTarget::parse(body, keys).map(SinkTarget::Parquet),
+        "smtp" | "smtps" => MailTarget::parse(body, keys, scheme == "smtps").map(SinkTarget::Mail),
         "shdr" => ShdrTarget::parse(body, keys).map(SinkTarget::Shdr),
         "sparkplug" | "sparkplugs" => {
             SparkplugTarget::parse(body, keys, scheme == "sparkplugs").map(SinkTarget::Sparkplug)

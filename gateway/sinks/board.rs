@@ -4,6 +4,7 @@ use super::SinkError;
 use super::status::SinkStatus;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use adapter_core::histogram::Histogram;
+use gateway_base::log::{Notice, Severity};
 use gateway_base::problem::StatusProblem;
 use gateway_history::Outbox;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -21,6 +22,8 @@ pub(super) struct Progress {
     /// The last item that the receiver would not take, and why.
     pub(super) refusal: Option<String>,
     pub(super) failing: bool,
+    /// What is wrong although items are delivered.
+    pub(super) fault: Option<SinkError>,
     /// Time of the newest delivered item of the oldest gap, or of live data where there is no gap.
     pub(super) reached_ns: Option<TimeNs>,
 }
@@ -71,14 +74,32 @@ impl Board {
         news
     }
 
-    /// The sinks that fail at the moment.
+    /// What is wrong although items are delivered, or that nothing is any more; logged when it is news.
+    pub(super) fn record_fault(&self, index: usize, fault: Option<SinkError>) {
+        let mut news = None;
+        if let Some(entry) = self.lock().get_mut(index) {
+            let told = fault.as_ref().filter(|_| entry.progress.fault != fault);
+            news = told.map(|fault| format!("sink {}: {fault}", entry.name));
+            entry.progress.fault = fault;
+        }
+        if let Some(text) = news {
+            Notice::new(Severity::Warning, "sink_fault", text).write_to_logs();
+        }
+    }
+
+    /// The sinks that fail at the moment, and those that do not reach everybody.
     #[must_use]
     pub fn list_problems(&self) -> Vec<StatusProblem> {
-        let problem = |entry: &BoardEntry| {
+        let failing = |entry: &BoardEntry| {
             let next = "it is tried again by itself; what waits is kept (see `sinks` in the status)".to_owned();
             let error = entry.progress.error.as_ref().filter(|_| entry.progress.failing)?;
             Some(StatusProblem { what: format!("sink {}: {error}", entry.name), next })
         };
+        let partly = |entry: &BoardEntry| {
+            let (what, next) = entry.progress.fault.as_ref()?.as_parts();
+            Some(StatusProblem { what: format!("sink {}: {what}", entry.name), next: next.to_owned() })
+        };
+        let problem = |entry: &BoardEntry| failing(entry).or_else(|| partly(entry));
         self.lock().iter().filter_map(problem).collect()
     }
 

@@ -1,12 +1,12 @@
 //! The task of a sink: connects, sends live data first and old data between, tries again with growing pauses.
 
+mod hold;
+
 use super::board::{Board, to_seconds};
 use super::isolation::{Isolation, Turn};
 use super::{Batch, Requests, Sink, SinkError, open_sink};
 use crate::sink_config::SinkConfig;
-use adapter_core::clock::TimeNs;
 use gateway_base::clock;
-use gateway_base::convert::clamp_to_unsigned;
 use gateway_base::log::{Notice, Severity};
 use gateway_control::OrderSender;
 use gateway_history::{Item, Outbox, OutboxHead, OutboxReader, OutboxStretch};
@@ -24,8 +24,6 @@ const PAUSE_MAX: Duration = Duration::from_secs(20);
 const DEADLINE: Duration = Duration::from_secs(60);
 /// How long a farewell may take.
 const FAREWELL: Duration = Duration::from_secs(2);
-/// While nothing is to be sent, it is looked at this often whether that is over.
-const HELD_LOOK_EVERY: Duration = Duration::from_secs(30);
 /// With more items than this waiting when the connection stands, the sink goes on with live data and fills the gap later;
 /// fewer are sent in their order. At ten items a second this is the delay of a second.
 const JUMP_ITEMS: u64 = 10;
@@ -69,6 +67,7 @@ pub fn start_with(sinks: Vec<(String, Box<dyn Sink>)>, outbox: &Outbox, board: &
             stopping: stopping.clone(),
             outbox_reader: None,
             isolation: Isolation::default(),
+            walked_to: 0,
         };
         tokio::spawn(task.run(sink))
     };
@@ -98,6 +97,8 @@ struct SinkTask {
     /// With the name of the history that it reads.
     outbox_reader: Option<(String, OutboxReader)>,
     isolation: Isolation,
+    /// Below this number everything that is not delivered is held back.
+    walked_to: u64,
 }
 
 /// Why a connection was left.
@@ -160,7 +161,7 @@ impl SinkTask {
         if let Err(error) = connected.unwrap_or_else(|_| Err(too_slow("connecting"))) {
             return Left::Failed(error);
         }
-        *tries = 0;
+        (*tries, self.walked_to) = (0, 0);
         self.outbox.set_linked(&self.name, true);
         let mut failed = false;
         self.board.update_progress(self.index, |progress| {
@@ -199,9 +200,10 @@ impl SinkTask {
 
     /// One batch of live data, or else one of old data, or else waits for something to happen.
     async fn deliver_next(&mut self, sink: &mut dyn Sink, head: &mut watch::Receiver<OutboxHead>) -> Result<(), Left> {
-        if let Some(until_ns) = sink.held_until(clock::now_ns()) {
-            return self.wait_held(sink, until_ns).await;
+        if let Some(hold) = sink.find_hold(clock::now_ns()) {
+            return self.serve_held(sink, head, hold).await;
         }
+        self.walked_to = 0;
         let newest = *head.borrow_and_update();
         let Some(standing) = self.outbox.delivery_state(&self.name) else { return Err(Left::Stop) };
         let next = standing.position.next();
@@ -217,24 +219,6 @@ impl SinkTask {
             _ = self.stopping.wait_for(|stop| *stop) => return Err(Left::Stop),
         };
         serve_within_deadline(sink, wanted).await
-    }
-
-    /// Nothing is to be sent now. The clock may be set meanwhile: it is looked at again before long.
-    async fn wait_held(&mut self, sink: &mut dyn Sink, until_ns: TimeNs) -> Result<(), Left> {
-        let left_ns = until_ns.saturating_sub(clock::now_ns());
-        let left = Duration::from_nanos(clamp_to_unsigned(left_ns)).min(HELD_LOOK_EVERY);
-        // Nobody who stops the box waits for a sink that sends nothing.
-        self.outbox.set_linked(&self.name, false);
-        let wanted = tokio::select! {
-            () = sleep(left) => Ok(None),
-            wanted = sink.wait_for_receiver() => Ok(Some(wanted)),
-            _ = self.stopping.wait_for(|stop| *stop) => Err(Left::Stop),
-        };
-        self.outbox.set_linked(&self.name, true);
-        match wanted? {
-            Some(wanted) => serve_within_deadline(sink, wanted).await,
-            None => Ok(()),
-        }
     }
 
     async fn deliver_batch(
@@ -255,6 +239,7 @@ impl SinkTask {
         );
         let from = self.skip_missing(turn, from, items);
         let sent = timeout(DEADLINE, sink.send_batch(Batch { items, historical })).await;
+        self.board.record_fault(self.index, sink.find_fault());
         match (turn, sent.unwrap_or_else(|_| Err(too_slow("sending")))) {
             // It is sent once more when it is its turn.
             (Turn::Past(_), Ok(()) | Err(SinkError::Item { .. })) => self.isolation.carried_witness(),

@@ -15,12 +15,14 @@
 //! Sinks run on tokio and read the history on connections of their own. No sink can hold up the tick or the writer.
 
 pub mod address;
+pub mod alarms;
 mod board;
 pub mod broker;
 pub mod doctor;
 pub mod drive;
 mod isolation;
 mod listen;
+pub mod mail;
 pub mod mqtt;
 pub mod nats;
 #[cfg(feature = "opcua")]
@@ -99,8 +101,18 @@ pub trait Sink: Send {
         true
     }
 
-    /// Until when nothing is to be sent, where that is so now, ns since 1970. Everything waits in the outbox meanwhile.
-    fn held_until(&self, _now_ns: TimeNs) -> Option<TimeNs> {
+    /// Until when items are held back, where that is so now. They wait in the outbox meanwhile.
+    fn find_hold(&self, _now_ns: TimeNs) -> Option<Hold> {
+        None
+    }
+
+    /// Is this one of the items that are held back where [`Sink::find_hold`] says so?
+    fn is_held(&self, _item: &Item) -> bool {
+        true
+    }
+
+    /// What is wrong although items are delivered: for the status and the log.
+    fn find_fault(&self) -> Option<SinkError> {
         None
     }
 
@@ -113,6 +125,15 @@ pub trait Sink: Send {
     fn items_max(&self) -> usize {
         256
     }
+}
+
+/// Items are held back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Hold {
+    /// Until then, ns since 1970.
+    pub until_ns: TimeNs,
+    /// Some items go all the same.
+    pub some_pass: bool,
 }
 
 /// Why items could not be sent.

@@ -1,5 +1,6 @@
 //! From an address to a sink.
 
+use super::mail::open_mail;
 use super::mqtt::MqttSink;
 use super::nats::NatsSink;
 #[cfg(feature = "opcua")]
@@ -7,7 +8,7 @@ use super::opcua::OpcuaSink;
 use super::parquet::ParquetSink;
 use super::shdr::ShdrSink;
 use super::sparkplug::SparkplugSink;
-use super::webhook::WebhookSink;
+use super::webhook::open_webhook;
 use super::{Requests, Sink, SinkAddress, SinkTarget};
 use gateway_history::Outbox;
 use std::path::Path;
@@ -22,6 +23,7 @@ pub fn open_sink(
     history: &Path,
 ) -> Box<dyn Sink> {
     match address.target() {
+        SinkTarget::Mail(target) => Box::new(open_mail(target.clone(), outbox)),
         SinkTarget::Mqtt(target) => Box::new(MqttSink::new(target.clone(), (name, requests), outbox)),
         SinkTarget::Nats(target) => Box::new(NatsSink::new(target.clone(), name, outbox)),
         #[cfg(feature = "opcua")]
@@ -29,6 +31,6 @@ pub fn open_sink(
         SinkTarget::Parquet(target) => Box::new(ParquetSink::new(target.clone(), outbox, history)),
         SinkTarget::Shdr(target) => Box::new(ShdrSink::new(target.clone(), outbox)),
         SinkTarget::Sparkplug(target) => Box::new(SparkplugSink::new(target.clone(), (name, requests), outbox)),
-        SinkTarget::Webhook(target) => Box::new(WebhookSink::new(target.clone(), outbox)),
+        SinkTarget::Webhook(target) => Box::new(open_webhook(target.clone(), outbox)),
     }
 }

@@ -43,11 +43,15 @@ const LICENCES: [&str; 11] = [
 ];
 
 /// Crates that are in the tree in two versions, each with the reason.
-const DUPLICATES: [(&str, &str); 8] = [
+const DUPLICATES: [(&str, &str); 9] = [
     ("base64", "the older one comes with the client of PostgreSQL, only in the feature `fleet`"),
     ("bit-vec", "the older one belongs to an optional part of rcgen that is not built"),
     ("fallible-iterator", "the older one comes with the client of PostgreSQL, only in the feature `fleet`"),
     ("getrandom", "rhai's hash, rand 0.9 and the test tools each ask for their own generation"),
+    (
+        "nom",
+        "the older one parses certificates (x509-parser, no release with 8 yet); the newer one parses answers of mail servers (lettre)",
+    ),
     ("num-bigint", "the older one belongs to an optional part of rcgen that is not built"),
     ("rand", "0.9 for the seeded distributions; 0.10 only within proptest"),
     ("rand_core", "goes with rand"),

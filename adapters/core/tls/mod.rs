@@ -51,12 +51,25 @@ impl TlsFiles {
         Ok(Arc::new(config))
     }
 
-    fn load_roots(&self) -> Result<RootCertStore, TlsError> {
+    /// The certificates that are trusted, for a library that wants them one by one.
+    ///
+    /// # Errors
+    /// As of [`TlsFiles::build_config`].
+    pub fn load_trusted(&self) -> Result<Vec<CertificateDer<'static>>, TlsError> {
+        let usable = |certificate: &CertificateDer<'static>| RootCertStore::empty().add(certificate.clone()).is_ok();
+        Ok(load_certificates(&self.find_roots_file()?)?.into_iter().filter(usable).collect())
+    }
+
+    fn find_roots_file(&self) -> Result<PathBuf, TlsError> {
         let system = || SYSTEM_FILES.iter().map(PathBuf::from).find(|file| file.is_file());
-        let Some(file) = self.ca.clone().or_else(system) else {
+        self.ca.clone().or_else(system).ok_or_else(|| {
             let next = "install the package ca-certificates, or name the file with ca=/path/ca.pem";
-            return Err(TlsError::new("this system has no file of trusted certificates", next));
-        };
+            TlsError::new("this system has no file of trusted certificates", next)
+        })
+    }
+
+    fn load_roots(&self) -> Result<RootCertStore, TlsError> {
+        let file = self.find_roots_file()?;
         let mut roots = RootCertStore::empty();
         let (taken, _unusable) = roots.add_parsable_certificates(load_certificates(&file)?);
         if taken == 0 {

@@ -10,7 +10,11 @@ WITH shift AS (
 ), done AS (
   SELECT * FROM shift WHERE begins < now() AND ends > now() - interval '7 days'
 ), stretch AS (
-  SELECT shift, day, begins, done.ends, box_id, state, since, until FROM done JOIN state_list ON since >= begins AND since < done.ends
+  -- By box, so that each shift reads its own rows by the key; OFFSET 0 keeps the planner from joining otherwise.
+  SELECT shift, day, begins, done.ends, boxes.box_id, begun.state, begun.since, begun.until
+  FROM done CROSS JOIN boxes CROSS JOIN LATERAL (
+    SELECT state, since, until FROM state_list WHERE state_list.box_id = boxes.box_id AND since >= begins AND since < done.ends OFFSET 0
+  ) AS begun
   UNION ALL
   SELECT shift, day, begins, done.ends, boxes.box_id, running.state, running.since, running.until
   FROM done CROSS JOIN boxes CROSS JOIN LATERAL (
@@ -34,13 +38,20 @@ WITH shift AS (
     SELECT coalesce(
       (SELECT sum(value::text::float8) FILTER (WHERE fleet_is_at_work(key))
        FROM jsonb_each(CASE jsonb_typeof(detail -> 'seconds') WHEN 'object' THEN detail -> 'seconds' ELSE '{}' END)),
-      (SELECT sum(extract(epoch FROM least(coalesce(until, ended), ended) - greatest(since, began)))::float8 FROM state_list
-       WHERE state_list.box_id = part_list.box_id AND since < ended AND coalesce(until, ended) > began AND since > began - interval '1 day'
-         AND fleet_is_at_work(state))) AS seconds
+      (SELECT sum(extract(epoch FROM least(coalesce(until, ended), ended) - greatest(since, began)))::float8
+       FROM (
+         -- What ran when the cycle began, and what has begun since.
+         (SELECT state, since, until FROM state_list
+          WHERE state_list.box_id = part_list.box_id AND since <= began AND since > began - interval '1 day'
+          ORDER BY since DESC, epoch DESC, sequence DESC LIMIT 1)
+         UNION ALL
+         SELECT state, since, until FROM state_list WHERE state_list.box_id = part_list.box_id AND since > began AND since < ended
+       ) AS near
+       WHERE coalesce(until, ended) > began AND fleet_is_at_work(state))) AS seconds
   ) AS work
   WHERE ended >= now() - interval '8 days' AND count > 0
 ), fastest AS (
-  SELECT program, percentile_cont(0.1) WITHIN GROUP (ORDER BY seconds) AS seconds FROM cycle GROUP BY program
+  SELECT coalesce(program, '') AS program, percentile_cont(0.1) WITHIN GROUP (ORDER BY seconds) AS seconds FROM cycle GROUP BY 1
 ), made AS (
   SELECT shift, day, box_id, sum(count) FILTER (WHERE ended >= begins AND ended < ends) AS parts,
          CASE WHEN bool_and(target IS NOT NULL) THEN sum(count * target * share) END AS target_s
@@ -49,7 +60,7 @@ WITH shift AS (
            CASE WHEN ended > began THEN extract(epoch FROM least(ended, done.ends) - greatest(began, begins)) / extract(epoch FROM ended - began)
                 ELSE 1 END::float8 AS share
     FROM done JOIN cycle ON ended >= begins AND began < done.ends
-    LEFT JOIN fastest ON fastest.program IS NOT DISTINCT FROM cycle.program
+    LEFT JOIN fastest ON fastest.program = coalesce(cycle.program, '')
     LEFT JOIN cycle_targets ON cycle_targets.program = cycle.program
   ) AS shared
   GROUP BY shift, day, box_id

@@ -233,6 +233,11 @@ impl Outbox {
         jumped
     }
 
+    /// Sink `name` keeps this item back; [`Position::hold_item`].
+    pub fn hold_item(&self, name: &str, sequence: u64) {
+        self.change_state(name, |standing| standing.position.hold_item(sequence));
+    }
+
     /// Sink `name` is connected, or is not.
     pub fn set_linked(&self, name: &str, linked: bool) {
         if let Some(standing) = lock_mutex(&self.shared.deliveries).get_mut(name) {

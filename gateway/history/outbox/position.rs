@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// More gaps are not kept: the sink then delivers in order of the numbers until one is closed. Bounds the position to
-/// about a kilobyte.
+/// More gaps are not kept: the sink then delivers in order of the numbers until one is closed, and what it delivers out of order
+/// counts as not delivered. Bounds the position to about a kilobyte.
 const GAPS_MAX: usize = 64;
 
 /// What a sink still has to deliver.
@@ -70,11 +70,36 @@ impl Position {
         true
     }
 
+    /// The item `number`, the first that is not delivered from some number on, stays open, and what comes after it may be delivered.
+    pub fn hold_item(&mut self, number: u64) {
+        if number < self.next {
+            return;
+        }
+        let (end, full) = (number.saturating_add(1), self.gaps.len() >= GAPS_MAX);
+        match self.gaps.last_mut() {
+            // What lies between is sent once more: better than a warning that is lost.
+            Some((_, last)) if full || *last == self.next => *last = end,
+            _ => self.gaps.push((self.next, end)),
+        }
+        self.next = end;
+    }
+
+    /// The first stretch `from..to` of items from `number` on, and below `head`, that are not delivered.
+    #[must_use]
+    pub fn undelivered_from(&self, number: u64, head: u64) -> Option<(u64, u64)> {
+        let open = (self.next, head);
+        let mut rest = self.gaps.iter().copied().chain([open]).map(|(from, to)| (from.max(number), to.min(head)));
+        rest.find(|(from, to)| from < to)
+    }
+
     /// The items `from..to` are delivered, or are not there any more.
     pub fn mark_delivered(&mut self, from: u64, to: u64) {
         let cut = |(start, end): (u64, u64)| [(start, end.min(from)), (start.max(to), end)];
         let left = |(start, end): &(u64, u64)| start < end;
-        self.gaps = self.gaps.iter().copied().flat_map(cut).filter(left).collect();
+        let gaps: Vec<(u64, u64)> = self.gaps.iter().copied().flat_map(cut).filter(left).collect();
+        if gaps.len() <= GAPS_MAX.max(self.gaps.len()) {
+            self.gaps = gaps;
+        }
         if from <= self.next && to > self.next {
             self.next = to;
         }
@@ -113,6 +138,38 @@ mod tests {
         assert_eq!(position.count_waiting(head), 2 * GAPS_MAX as u64);
         position.mark_delivered(1, 3);
         assert!(position.jump_to_head(head + 2));
+    }
+
+    #[test]
+    fn what_is_held_stays_open_and_the_rest_is_delivered() {
+        let mut position = Position::from_next(1);
+        position.mark_delivered(1, 5);
+        position.hold_item(5);
+        position.hold_item(6);
+        position.mark_delivered(7, 9);
+        assert_eq!((position.oldest_gap(), position.next(), position.count_waiting(9)), (Some((5, 7)), 9, 2));
+        let from = |number| position.undelivered_from(number, 12);
+        assert_eq!((from(0), from(6), from(7), from(12)), (Some((5, 7)), Some((6, 7)), Some((9, 12)), None));
+        // Held within what an outage left: the gap stays as it is.
+        assert!(position.jump_to_head(20));
+        position.hold_item(10);
+        assert_eq!((position.undelivered_from(7, 30), position.next()), (Some((9, 20)), 20));
+    }
+
+    #[test]
+    fn however_many_are_held_the_position_is_bounded_and_none_is_forgotten() {
+        let mut position = Position::from_next(0);
+        for number in (0..1000).step_by(2) {
+            position.mark_delivered(number, number + 1);
+            position.hold_item(number + 1);
+            assert!(position.gaps.len() <= GAPS_MAX);
+        }
+        assert!((1..1000).step_by(2).all(|number| position.count_within(number, number + 1) == 1));
+        // A hole in the middle would be a gap more: it counts as not delivered.
+        position.mark_delivered(500, 501);
+        assert_eq!((position.gaps.len(), position.count_within(500, 501)), (GAPS_MAX, 1));
+        position.mark_delivered(0, 1000);
+        assert_eq!(position, Position::from_next(1000));
     }
 
     proptest! {

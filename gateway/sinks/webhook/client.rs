@@ -117,7 +117,7 @@ impl HttpConnection {
 }
 
 /// `host:port`, with brackets around an address of IPv6.
-pub(super) fn format_place(at: &Endpoint) -> String {
+pub(crate) fn format_place(at: &Endpoint) -> String {
     let Endpoint { host, port } = at;
     if host.contains(':') { format!("[{host}]:{port}") } else { format!("{host}:{port}") }
 }

@@ -7,6 +7,7 @@ mod boxes;
 mod killed;
 mod means;
 mod monitoring;
+mod panels;
 pub(crate) mod partitions;
 mod pipeline;
 mod poison;

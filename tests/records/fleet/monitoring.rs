@@ -9,7 +9,7 @@ use testkit::box_under_test::Sending;
 use testkit::process::{get, run, stdout};
 
 /// `promtool` with these arguments in the directory of the rules; `None` where it is not installed.
-fn promtool(arguments: &[&str], input: &str) -> Option<String> {
+pub(super) fn promtool(arguments: &[&str], input: &str) -> Option<String> {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("gateway/monitoring");
     let mut command = Command::new("promtool");
     command.args(arguments).current_dir(directory).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -36,6 +36,15 @@ fn every_alert_fires_when_it_shall_and_the_program_prints_these_rules() {
     let Some(said) = promtool(&["test", "rules", "alerts_test.yml"], "") else { return };
     println!("{said}");
     promtool(&["check", "rules", "alerts.yml"], "");
+    let (rules, tests) = (
+        include_str!("../../../gateway/monitoring/alerts.yml"),
+        include_str!("../../../gateway/monitoring/alerts_test.yml"),
+    );
+    for name in rules.lines().filter_map(|line| line.trim().strip_prefix("- alert: ")) {
+        let tried: Vec<&str> = tests.split(&format!("alertname: {name}\n")).skip(1).collect();
+        let quiet = tried.iter().filter(|test| test.trim_start().starts_with("exp_alerts: []")).count();
+        assert!(quiet > 0 && tried.len() > quiet, "{name}: {quiet} of {} tests expect nothing", tried.len());
+    }
     let printed = stdout(&run(&["metrics", "alerts"]));
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("gateway/monitoring/alerts.yml");
     assert_eq!(printed, std::fs::read_to_string(file).expect("there"));
@@ -79,38 +88,4 @@ fn what_dashboard_and_alerts_ask_for_is_told_by_a_box_with_a_sink() {
         assert!(metrics.contains(name), "{name}: {metrics}");
     }
     live.stop();
-}
-
-/// The panel of the states, asked as Grafana asks it, over two boxes whose seconds are known.
-#[test]
-fn the_panel_of_the_states_shows_the_share_of_each() {
-    let dashboard: serde_json::Value = serde_json::from_str(&stdout(&run(&["metrics", "dashboard"]))).expect("JSON");
-    let panels = dashboard["panels"].as_array().expect("a list");
-    let panel = panels.iter().find(|panel| panel["title"] == "State of the machines").expect("the panel");
-    let asked = panel["targets"][0]["expr"].as_str().expect("a question");
-    let asked = asked.replace("$instance", ".*").replace("$__rate_interval", "5m");
-    let series = |instance: &str, state: &str, seconds: u32| {
-        serde_json::json!({
-            "series": format!("cncgw_machine_state_seconds_total{{instance=\"{instance}\", state=\"{state}\"}}"),
-            "values": format!("0+{seconds}x20"),
-        })
-    };
-    let info = |instance: &str| {
-        let name = format!("cncgw_build_info{{instance=\"{instance}\", version=\"1\", machine=\"{instance}\"}}");
-        serde_json::json!({"series": name, "values": "1x20"})
-    };
-    let share =
-        |state: &str, share: f64| serde_json::json!({"labels": format!("{{state=\"{state}\"}}"), "value": share});
-    // YAML holds JSON. Of each minute the first cuts for 45 s, the second for 30 s.
-    let test = serde_json::json!({"evaluation_interval": "1m", "tests": [{
-        "interval": "1m",
-        "input_series": [series("a", "cutting", 45), series("a", "idle", 15), series("b", "cutting", 30), series("b", "idle", 30),
-            info("a"), info("b")],
-        "promql_expr_test": [{"expr": asked, "eval_time": "10m", "exp_samples": [share("cutting", 0.625), share("idle", 0.375)]}],
-    }]});
-    let directory = tempfile::tempdir().expect("a directory");
-    let file = directory.path().join("panel.yml");
-    std::fs::write(&file, test.to_string()).expect("writable");
-    let Some(said) = promtool(&["test", "rules", &file.display().to_string()], "") else { return };
-    assert!(said.contains("SUCCESS"), "{said}");
 }

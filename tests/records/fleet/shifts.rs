@@ -1,6 +1,7 @@
 //! Every question in a small plant whose truth is known: shifts east of UTC and over the night in which the clocks go back, standby between
 //! parts, a shift without parts, two boxes whose machines have one name.
 
+use crate::fleet::panels::every_panel_of_the_fleet;
 use crate::fleet::pipeline::Plant;
 use std::time::Instant;
 use testkit::process::{run, stdout};
@@ -24,6 +25,7 @@ fn every_shift_of_a_plant_of_known_truth_has_its_value() {
     // The tables are made by the first reader.
     plant.ingest();
     plant.postgres.sql(include_str!("shifts.sql"));
+    assert_eq!(plant.postgres.sql("SHOW jit"), "off", "compiling the question for OEE took 3 s, running it 2 ms");
     // Machine, shift, day, parts, availability, performance, OEE, hours known; empty where nothing is known.
     let rows = ask(&plant, "oee-per-shift");
     let has = |row: &str| assert!(rows.contains(&row.to_owned()), "{row} is not among {rows:#?}");
@@ -36,6 +38,7 @@ fn every_shift_of_a_plant_of_known_truth_has_its_value() {
     // Of the first part of A two thirds lie in the late shift of UTC, which it did not end in.
     has("Lathe 7 (A)|late|2026-10-24||1.0000|0.8333|0.8333|2.0000");
     assert!(rows.iter().all(|row| !row.contains("early|2026-10-26|2.0000") || row.starts_with("Mill 2")), "{rows:#?}");
+    every_panel_of_the_fleet(&plant);
     // Whatever the time zone of whoever asks: behind UTC, and ahead of it by half an hour beside whole ones.
     for zone in ["America/New_York", "Asia/Kolkata"] {
         plant.postgres.sql(&format!("ALTER DATABASE postgres SET timezone TO '{zone}'"));
