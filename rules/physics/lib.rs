@@ -231,6 +231,11 @@ pub trait Effect: Sync + Send {
         true
     }
 
+    /// Does each of its terms belong to an edge or a lot of its own? Without its term a law would say that this one does nothing.
+    fn has_term_per_unit(&self, _form: &Form) -> bool {
+        false
+    }
+
     /// Does a hidden state (how worn this tool is, a pump on or off, which lot) belong to a tool, lot or stretch, so
     /// that it must be followed through a held-out run?
     fn has_hidden_state(&self) -> bool {

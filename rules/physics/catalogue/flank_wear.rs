@@ -160,6 +160,10 @@ impl Effect for FlankWear {
         Some(vec![("k", times(&|row| minutes[row].max(0.0).powf(p)))])
     }
 
+    fn has_term_per_unit(&self, form: &Form) -> bool {
+        form.name == "edges"
+    }
+
     fn has_hidden_state(&self) -> bool {
         true
     }

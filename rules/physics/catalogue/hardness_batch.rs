@@ -133,6 +133,10 @@ impl Effect for HardnessBatch {
         Some(vec![("gain", multiply_cut(scene, |row| here[row])?)])
     }
 
+    fn has_term_per_unit(&self, form: &Form) -> bool {
+        matches!(form.name, "lots" | "stretches")
+    }
+
     fn has_hidden_state(&self) -> bool {
         true
     }

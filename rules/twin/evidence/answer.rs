@@ -164,15 +164,6 @@ impl EvidenceAnswer {
         *told = (*told + mass).min(1.0);
     }
 
-    /// Takes a name out, with what it contributes and what stands beside it.
-    pub(super) fn drop_name(&mut self, name: &str) {
-        self.names.retain(|known| known != name);
-        for named in [&mut self.contributions, &mut self.remaining] {
-            named.retain(|(known, _)| known != name);
-        }
-        self.rivals.retain(|rival| rival.instead_of != name);
-    }
-
     /// Sets something without a name beside some names: their curves are theirs, their textbook laws are not.
     pub(super) fn add_unknown_rivals(&mut self, doubted: &[String]) {
         if self.verdict == Verdict::Unexplained {

@@ -57,8 +57,7 @@ impl EvidenceReport<'_, '_> {
         let (textbook, written) = self.settle_names();
         let (textbook, written) = match written {
             Some(written) => {
-                let told = self.settle_rivals(textbook, written);
-                let (textbook, written) = self.drop_undetermined_names(told);
+                let (textbook, written) = self.settle_rivals(textbook, written);
                 let written = self.tell_written_model(&textbook, written);
                 (textbook, Some(written))
             }

@@ -2,12 +2,10 @@
 //! does not tell is not sure.
 
 use super::report::EvidenceReport;
-use super::textbook::Textbook;
-use super::written_model::WrittenModel;
 use crate::departure::is_of_departure;
-use crate::diagnosis::{Missing, ParameterEstimate, Verdict};
+use crate::diagnosis::{Missing, ParameterEstimate};
 use crate::fit::{Fit, Free};
-use crate::model::{Parameter, simulate_parts};
+use crate::model::{Parameter, Part, simulate_parts};
 use physics::Entry;
 
 /// Parameters of one fit that are settled, at most: a law of eight waves may keep one of them.
@@ -63,45 +61,46 @@ impl EvidenceReport<'_, '_> {
         best
     }
 
+    /// A fit in which a law with a size that the recording does not tell has another form, where one is told and predicts as well.
+    pub(super) fn replace_open_forms(&mut self, near: &[(String, Part)], fit: Fit) -> Fit {
+        let mut best = fit;
+        let most = self.compute_allowed_square(&best);
+        for (number, (name, _)) in near.iter().enumerate() {
+            let place = self.baseline.parts.len() + number;
+            // The scene holds load and output of whatever was fitted last.
+            let _ = simulate_parts(&best.parts, &mut self.case.scene);
+            if self.is_law_told(&best, place) {
+                continue;
+            }
+            let search = self.prepare_starts();
+            let mut told: Option<(f64, Fit)> = None;
+            for start in search.list_start_sets(&[self.list_law_starts(name, &search)]) {
+                let mut parts = best.parts.clone();
+                parts.splice(place..=place, start);
+                let Some(other) = self.refit_parts(&parts) else { continue };
+                let other = self.settle_parameters(other);
+                let square = self.prepare_left_out(&other).compute_square();
+                let is_better = square <= told.as_ref().map_or(most, |(square, _)| *square);
+                if is_better && self.is_law_told(&other, place) {
+                    told = Some((square, other));
+                }
+            }
+            best = told.map_or(best, |(_, fit)| fit);
+        }
+        let _ = simulate_parts(&best.parts, &mut self.case.scene);
+        best
+    }
+
+    /// Does the recording tell every size of the law at a place?
+    fn is_law_told(&self, fit: &Fit, place: usize) -> bool {
+        self.estimate_parameters(fit, place).iter().all(is_determined)
+    }
+
     /// Squares of rows left out up to which a simpler fit stands for this one.
     fn compute_allowed_square(&self, fit: &Fit) -> f64 {
         let least = self.prepare_left_out(fit).compute_square();
         let gain = self.prepare_left_out(self.baseline).compute_square() - least;
         least + (NO_LOSS * least).max(GAIN_FOR_TOLD * gain)
-    }
-
-    /// Without the names whose sizes the recording does not tell, where the other laws predict as well without them.
-    pub(super) fn drop_undetermined_names(&mut self, told: (Textbook, WrittenModel)) -> (Textbook, WrittenModel) {
-        let mut told = told;
-        while self.answer.verdict == Verdict::Explained && self.answer.names.len() > 1 {
-            let Some(fewer) = self.find_dispensable_name(&told.0) else { break };
-            told = fewer;
-        }
-        told
-    }
-
-    /// Drops the first name that can be done without; gives what is told then.
-    fn find_dispensable_name(&mut self, textbook: &Textbook) -> Option<(Textbook, WrittenModel)> {
-        let fit = textbook.fit.as_ref()?;
-        let most = self.compute_allowed_square(fit);
-        for (number, name) in self.answer.names.clone().into_iter().enumerate() {
-            let Some((place, _)) = textbook.laws.get(number).copied().flatten() else { continue };
-            if self.estimate_parameters(fit, place).iter().all(is_determined) {
-                continue;
-            }
-            let Some(without) = self.fit_without(fit, place) else { continue };
-            if self.prepare_left_out(&without).compute_square() > most {
-                continue;
-            }
-            let Some(written) = self.write_fit(&without) else { continue };
-            let mut laws = textbook.laws.clone();
-            laws.remove(number);
-            let behind = laws.iter_mut().flatten().filter(|(other, _)| *other > place);
-            behind.for_each(|(other, _)| *other -= 1);
-            self.answer.drop_name(&name);
-            return Some((Textbook { laws, fit: Some(without) }, written));
-        }
-        None
     }
 
     /// The parameter of a law that the recording tells least, and the value it gets; `None` where everything is told.
@@ -150,9 +149,12 @@ impl EvidenceReport<'_, '_> {
             return Some((*shape, parameter(shape).value));
         }
         // The rest of the law stands without the term whose size is known least.
+        let is_of_unit =
+            |part: &Part| part.effect_and_form().is_some_and(|(effect, form)| effect.has_term_per_unit(&form));
         let may_go = |at: &&Free| {
             let (low, high) = parameter(at).range;
-            is_open(at) && (low..=high).contains(&0.0) && count_sizes(at.part) > 1
+            let is_term = (low..=high).contains(&0.0) && count_sizes(at.part) > 1;
+            is_term && is_open(at) && !is_of_unit(&fit.parts[at.part])
         };
         free().filter(may_go).min_by(|a, b| certainty(a).total_cmp(&certainty(b))).map(|at| (*at, 0.0))
     }

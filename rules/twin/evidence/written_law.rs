@@ -28,7 +28,8 @@ impl EvidenceReport<'_, '_> {
         let first = self.fit_from_starts(near)?;
         let best = self.mend_by_subsets(near, first);
         let wider = self.add_departures(best);
-        Some(self.settle_parameters(wider))
+        let settled = self.settle_parameters(wider);
+        Some(self.replace_open_forms(near, settled))
     }
 
     /// Of the fits from the nearest laws and from the output the one that leaves least of rows left out.
