@@ -17,7 +17,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(2);
 const DISTANCES: usize = 9;
 
 /// The way in which a device tells its observations.
-pub(crate) enum Feed {
+pub(crate) enum ObservationFeed {
     Stream(LiveStream),
     /// The agent answers a question for parts with one document: it is asked at every poll.
     Questions,
@@ -83,7 +83,7 @@ impl LiveStream {
     }
 
     fn note_distance(&mut self, parts: usize) {
-        let distance = self.last_part.elapsed() / u32::try_from(parts).unwrap_or(u32::MAX);
+        let distance = self.last_part.elapsed() / adapter_core::integer::convert_bounded(parts.min(1 << 20), u32::MAX);
         if self.distances.len() >= DISTANCES {
             self.distances.pop_front();
         }

@@ -25,7 +25,7 @@ pub(crate) struct AgentState {
     next: u64,
     buffer: VecDeque<BufferedObservation>,
     pub(crate) buffer_size: usize,
-    /// Answers in parts?
+    /// Does it answer in parts, where it is asked to?
     pub(crate) streams: bool,
     /// Bytes that are sent for a request whose path contains this word, instead of an answer.
     pub(crate) instead: Option<(&'static str, Vec<u8>)>,
@@ -123,7 +123,7 @@ impl AgentState {
 pub(crate) struct ScriptedAgent {
     pub(crate) port: u16,
     state: Arc<Mutex<AgentState>>,
-    stopped: Arc<AtomicBool>,
+    is_stopped: Arc<AtomicBool>,
 }
 
 impl ScriptedAgent {
@@ -156,7 +156,7 @@ impl ScriptedAgent {
                 std::thread::spawn(move || answer(stream, &state, &stop));
             }
         });
-        Self { port, state, stopped }
+        Self { port, state, is_stopped: stopped }
     }
 
     pub(crate) fn lock(&self) -> MutexGuard<'_, AgentState> {
@@ -166,7 +166,7 @@ impl ScriptedAgent {
 
 impl Drop for ScriptedAgent {
     fn drop(&mut self) {
-        self.stopped.store(true, Ordering::SeqCst);
+        self.is_stopped.store(true, Ordering::SeqCst);
         let _ = TcpStream::connect(("127.0.0.1", self.port));
     }
 }

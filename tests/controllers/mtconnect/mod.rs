@@ -230,7 +230,7 @@ fn every_observation_comes_once_through_restarts_and_a_gap_is_told() {
 }
 
 #[test]
-#[ignore = "a campaign of ten seconds: 60,000 observations and 10 restarts"]
+#[ignore = "10 seconds: 60,000 observations of a foreign agent through 10 restarts come once each"]
 fn sixty_thousand_observations_come_once_through_ten_restarts() {
     assert!(agent_is_there(), "pip install mtconnect==0.3.3");
     read_all_once(60_000, 10);
