@@ -11,6 +11,9 @@ use std::time::{Duration, Instant};
 /// At most so many bytes are taken at one poll: more than an agent sends in one, and little enough that a poll ends.
 const BYTES_MAX: usize = 64 << 20;
 
+/// An answer in parts that has come for so long is one that goes on. An agent that sends nothing while nothing changes is quiet once in such a time
+/// on any machine.
+const STEADY: Duration = Duration::from_secs(60);
 /// Pause between two looks while a part is waited for.
 const LOOK_EVERY: Duration = Duration::from_millis(2);
 /// Of so many parts the usual distance is known.
@@ -28,6 +31,7 @@ pub(crate) struct LiveStream {
     stream: TcpStream,
     decoder: BodyDecoder,
     splitter: MultipartSplitter,
+    began: Instant,
     last_part: Instant,
     /// Longest time without a part.
     silence: Duration,
@@ -50,6 +54,7 @@ impl LiveStream {
             stream,
             decoder,
             splitter,
+            began: Instant::now(),
             last_part: Instant::now(),
             silence,
             parts: 0,
@@ -80,6 +85,11 @@ impl LiveStream {
             return Err(HttpError::Line("the agent ended its answer".to_owned()));
         }
         if self.last_part.elapsed() > self.silence { Err(HttpError::Timeout) } else { Ok(parts) }
+    }
+
+    /// Has it brought parts for so long that its agent certainly keeps sending?
+    pub(crate) fn is_steady(&self) -> bool {
+        self.parts > 1 && self.began.elapsed() > STEADY
     }
 
     fn note_distance(&mut self, parts: usize) {

@@ -33,6 +33,8 @@ pub(crate) struct AgentState {
     pub(crate) silent: Option<&'static str>,
     /// Sends its answers to requests whose path contains this word byte by byte.
     pub(crate) slow: Option<&'static str>,
+    /// Sends a part also when nothing has changed?
+    pub(crate) has_heartbeat: bool,
     /// Takes the name of a device before a request?
     pub(crate) takes_names: bool,
     /// Sends parts not more often than this.
@@ -140,6 +142,7 @@ impl ScriptedAgent {
             instead: None,
             silent: None,
             slow: None,
+            has_heartbeat: true,
             takes_names: true,
             least_interval_ms: 0,
             ends_streams: false,
@@ -265,9 +268,14 @@ fn stream_parts(
             continue;
         }
         let (body, next) = known.take_sample(from, count);
-        let ends = known.ends_streams;
+        let (ends, has_heartbeat) = (known.ends_streams, known.has_heartbeat);
         drop(known);
+        let is_quiet = next == from && !has_heartbeat;
         from = next;
+        if is_quiet {
+            std::thread::sleep(interval);
+            continue;
+        }
         let part = format!("\r\n--edge\r\nContent-type: text/xml\r\nContent-length: {}\r\n\r\n{body}\r\n", body.len());
         if stream.write_all(part.as_bytes()).is_err() || ends {
             return;

@@ -201,7 +201,7 @@ impl MtConnectSource {
                 let parts = stream.take_parts(interval);
                 let so_far = stream.parts;
                 let parts = parts.map_err(|error| self.end_stream(error, so_far))?;
-                if so_far > 1 {
+                if stream.is_steady() {
                     self.broken_streams = 0;
                 }
                 let arrived_ns = clock.now_ns();
@@ -242,7 +242,8 @@ impl MtConnectSource {
     }
 
     fn end_stream(&mut self, error: HttpError, parts: u64) -> SessionEnd {
-        self.broken_streams += u32::from(parts < 2);
+        // An agent that does not send while nothing changes looks like a broken line: it is asked instead.
+        self.broken_streams += u32::from(parts < 2 || error == HttpError::Timeout);
         match error {
             // An agent may end its answer at any time; where it is gone, the next question says so.
             HttpError::Line(_) => SessionEnd::Reopen,
