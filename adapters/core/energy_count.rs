@@ -37,7 +37,7 @@ const TOLD_NS: i64 = 600 * SECOND_NS;
 pub enum CounterEvent {
     /// It began anew at the end of its range.
     Rollover,
-    /// It was set to a lower count.
+    /// It was set to a lower count and went on from there.
     Reset,
     /// It was set to a higher count, or is another counter.
     Replaced,
@@ -50,7 +50,7 @@ pub enum CounterEvent {
 }
 
 impl CounterEvent {
-    /// Every event.
+    /// Every event, in the order of their counts.
     pub const ALL: [Self; 6] = [Self::Rollover, Self::Reset, Self::Replaced, Self::Zero, Self::Jump, Self::BelowZero];
 
     /// The fact that counts it.
@@ -114,7 +114,7 @@ struct OtherCount {
 #[derive(Debug, Clone, PartialEq)]
 pub struct EnergyCount {
     form: CounterForm,
-    believed: Option<(TimeNs, f64)>,
+    last_count: Option<(TimeNs, f64)>,
     other: Option<OtherCount>,
     is_below_zero: bool,
     consumed_kwh: f64,
@@ -128,7 +128,7 @@ impl EnergyCount {
     pub fn new(form: CounterForm) -> Self {
         Self {
             form,
-            believed: None,
+            last_count: None,
             other: None,
             is_below_zero: false,
             consumed_kwh: 0.0,
@@ -154,7 +154,7 @@ impl EnergyCount {
         if self.last_event.is_some_and(|(told_ns, _)| !(0..TOLD_NS).contains(&at_ns.saturating_sub(told_ns))) {
             self.last_event = None;
         }
-        let Some((believed_ns, last_kwh)) = self.believed else {
+        let Some((believed_ns, last_kwh)) = self.last_count else {
             return self.judge_first(at_ns, kwh);
         };
         let most_kwh = self.compute_most_kwh(at_ns, believed_ns, last_kwh);
@@ -187,7 +187,7 @@ impl EnergyCount {
     }
 
     fn believe(&mut self, at_ns: TimeNs, kwh: f64) {
-        (self.believed, self.other, self.is_below_zero) = (Some((at_ns, kwh)), None, false);
+        (self.last_count, self.other, self.is_below_zero) = (Some((at_ns, kwh)), None, false);
     }
 
     /// Can a counter have moved so? A register without a sign never falls. One that counts what is fed back does, by no more than the
@@ -251,7 +251,7 @@ impl EnergyCount {
             self.other = Some(other);
             return false;
         }
-        let is_lower = self.believed.is_some_and(|(_, last_kwh)| kwh < last_kwh);
+        let is_lower = self.last_count.is_some_and(|(_, last_kwh)| kwh < last_kwh);
         // From zero on it has counted what it shows, as far as that can be since it was last believed.
         let from_zero = is_lower && (0.0..=most_kwh).contains(&kwh);
         self.consumed_kwh += if from_zero { kwh } else { kwh - other.first_kwh };

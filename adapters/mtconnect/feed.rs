@@ -11,13 +11,16 @@ use std::time::{Duration, Instant};
 /// At most so many bytes are taken at one poll: more than an agent sends in one, and little enough that a poll ends.
 const BYTES_MAX: usize = 64 << 20;
 
+/// An answer in parts that has come for so long is one that goes on. An agent that sends nothing while nothing changes is quiet once in such a time
+/// on any machine.
+const STEADY: Duration = Duration::from_secs(60);
 /// Pause between two looks while a part is waited for.
 const LOOK_EVERY: Duration = Duration::from_millis(2);
 /// Of so many parts the usual distance is known.
 const DISTANCES: usize = 9;
 
 /// The way in which a device tells its observations.
-pub(crate) enum Feed {
+pub(crate) enum ObservationFeed {
     Stream(LiveStream),
     /// The agent answers a question for parts with one document: it is asked at every poll.
     Questions,
@@ -28,6 +31,7 @@ pub(crate) struct LiveStream {
     stream: TcpStream,
     decoder: BodyDecoder,
     splitter: MultipartSplitter,
+    began: Instant,
     last_part: Instant,
     /// Longest time without a part.
     silence: Duration,
@@ -50,6 +54,7 @@ impl LiveStream {
             stream,
             decoder,
             splitter,
+            began: Instant::now(),
             last_part: Instant::now(),
             silence,
             parts: 0,
@@ -82,8 +87,13 @@ impl LiveStream {
         if self.last_part.elapsed() > self.silence { Err(HttpError::Timeout) } else { Ok(parts) }
     }
 
+    /// Has it brought parts for so long that its agent certainly keeps sending?
+    pub(crate) fn is_steady(&self) -> bool {
+        self.parts > 1 && self.began.elapsed() > STEADY
+    }
+
     fn note_distance(&mut self, parts: usize) {
-        let distance = self.last_part.elapsed() / u32::try_from(parts).unwrap_or(u32::MAX);
+        let distance = self.last_part.elapsed() / adapter_core::integer::convert_bounded(parts.min(1 << 20), u32::MAX);
         if self.distances.len() >= DISTANCES {
             self.distances.pop_front();
         }

@@ -45,7 +45,7 @@ impl HeldValues {
 
     /// Has this observation of an item been taken already?
     pub(crate) fn holds_observation(&self, plan: &ChannelPlan, observation: &Observation) -> bool {
-        let fed = plan.fed.get(&observation.item).and_then(|fed| fed.first());
+        let fed = plan.channels_by_item.get(&observation.item).and_then(|fed| fed.first());
         let held = fed.and_then(|fed| self.values.get(&fed.channel));
         held.is_some_and(|held| held.sequence.is_some() && held.sequence == observation.sequence)
     }
@@ -69,7 +69,7 @@ impl HeldValues {
             }
             return;
         }
-        for fed in plan.fed.get(&observation.item).into_iter().flatten() {
+        for fed in plan.channels_by_item.get(&observation.item).into_iter().flatten() {
             let stamp = self.order_stamp(fed.channel, stamp);
             let reading = build_reading(fed, observation, stamp);
             self.note_unknown_word(fed, observation, &reading);
@@ -80,7 +80,7 @@ impl HeldValues {
 
     /// Appends what every channel says as of `stamp`.
     pub(crate) fn append_all(&mut self, plan: &ChannelPlan, stamp: Stamp, out: &mut Vec<Reading>) {
-        for fed in plan.fed.values().flatten() {
+        for fed in plan.channels_by_item.values().flatten() {
             let stamp = self.order_stamp(fed.channel, stamp);
             out.push(match self.values.get(&fed.channel) {
                 Some(held) if self.counts(held.sequence) => restamp(&held.reading, stamp),
@@ -124,7 +124,7 @@ impl HeldValues {
     }
 
     fn is_stopped(&self, plan: &ChannelPlan) -> bool {
-        let stop = plan.fed.values().flatten().find(|fed| fed.channel.name() == "emergency_stop");
+        let stop = plan.channels_by_item.values().flatten().find(|fed| fed.channel.name() == "emergency_stop");
         let held = stop.and_then(|fed| self.values.get(&fed.channel)).filter(|held| self.counts(held.sequence));
         held.is_some_and(|held| held.reading.value == Ok(Value::Number(1.0)))
     }

@@ -11,7 +11,7 @@ const TOLD_NS: i64 = 600 * SECOND_NS;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ReadingHistory {
     pub(crate) observations: u64,
-    pub(crate) lost: u64,
+    pub(crate) lost_count: u64,
     gaps: u64,
     pub(crate) restarts: u64,
     pub(crate) model_changes: u64,
@@ -25,7 +25,7 @@ pub(crate) struct ReadingHistory {
 impl ReadingHistory {
     pub(crate) fn record_gap(&mut self, now_ns: TimeNs, gap: Gap) {
         self.gaps += 1;
-        self.lost = self.lost.saturating_add(gap.count);
+        self.lost_count = self.lost_count.saturating_add(gap.count);
         self.last_gap = Some((now_ns, gap));
     }
 
@@ -45,7 +45,7 @@ impl ReadingHistory {
     pub(crate) fn collect_facts(&self) -> Vec<Fact> {
         let counts = [
             ("observations", self.observations),
-            ("lost_observations", self.lost),
+            ("lost_observations", self.lost_count),
             ("gaps", self.gaps),
             ("agent_restarts", self.restarts),
             ("model_changes", self.model_changes),

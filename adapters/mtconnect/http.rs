@@ -133,7 +133,7 @@ fn choose_decoder(encoding: Option<String>, length: Option<String>) -> Result<Bo
 }
 
 impl Response {
-    /// The whole body.
+    /// The whole body, without its framing.
     pub(crate) fn read_body(mut self, deadline: Deadline) -> Result<Vec<u8>, HttpError> {
         let nonsense = |error: crate::body::BrokenChunk| HttpError::Nonsense(error.to_string());
         let mut body = Vec::new();

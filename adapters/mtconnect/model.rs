@@ -1,6 +1,6 @@
 //! What an agent's devices are made of: MTConnectDevices, the answer to `probe`.
 
-use crate::xml::{Element, XmlError, XmlEvent, XmlReader};
+use crate::xml::{XmlElement, XmlError, XmlEvent, XmlReader};
 use std::collections::HashMap;
 use thiserror::Error;
 
@@ -12,20 +12,20 @@ const DEPTH_MAX: usize = 64;
 /// What a data item is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Category {
-    /// A physical quantity.
+    /// A physical quantity, in a unit.
     Sample,
     /// A state, a name or a count.
     Event,
-    /// Something that may be wrong.
+    /// Something that may be wrong with a component.
     Condition,
 }
 
-/// A part of a device.
+/// A part of a device, or the device itself.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Component {
-    /// Its kind: `Rotary`.
+    /// Its kind, as its element is called: `Rotary`.
     pub kind: String,
-    /// Its identifier.
+    /// Its identifier, which no other part of the agent has.
     pub id: String,
     /// Its name, where it has one.
     pub name: Option<String>,
@@ -40,19 +40,19 @@ pub struct Component {
 /// Something that a device tells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DataItem {
-    /// Its identifier.
+    /// Its identifier, which no other part of the agent has.
     pub id: String,
     /// Its name, where it has one.
     pub name: Option<String>,
-    /// What it is.
+    /// What kind of observations it has.
     pub category: Category,
-    /// Its type: `PATH_FEEDRATE`.
+    /// Its type, in capitals: `PATH_FEEDRATE`.
     pub kind: String,
     /// `ACTUAL`, `PROGRAMMED` and so on.
     pub sub_type: Option<String>,
     /// Unit into which the agent converts.
     pub units: Option<String>,
-    /// Unit of the control.
+    /// Unit in which the control counts.
     pub native_units: Option<String>,
     /// By which numbers of the control are divided.
     pub native_scale: Option<f64>,
@@ -60,7 +60,7 @@ pub struct DataItem {
     pub is_value: bool,
     /// Is it a mean or another figure over some time?
     pub has_statistic: bool,
-    /// `MACHINE` or `WORK`.
+    /// `MACHINE` or `WORK`, where it is a position.
     pub coordinate_system: Option<String>,
     /// Kind of the composition that it belongs to: `MOTOR`.
     pub composition: Option<String>,
@@ -68,12 +68,12 @@ pub struct DataItem {
     pub component: usize,
 }
 
-/// A device.
+/// A device of an agent, with its parts and what it tells.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Device {
-    /// Its name.
+    /// Its name, by which the agent is asked for it.
     pub name: String,
-    /// Its unique identifier.
+    /// Its identifier, unique in the world.
     pub uuid: String,
     /// Who made it, and as what.
     pub description: String,
@@ -81,7 +81,7 @@ pub struct Device {
     pub is_agent: bool,
     /// Its parts; the first one is the device itself.
     pub components: Vec<Component>,
-    /// What it tells.
+    /// What it tells, in the order of the document.
     pub items: Vec<DataItem>,
 }
 
@@ -113,24 +113,24 @@ impl Device {
 /// Why a text is no list of devices.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ModelError {
-    /// It is no XML.
+    /// It is no XML, or broken.
     #[error(transparent)]
     Xml(#[from] XmlError),
-    /// It is another document.
+    /// It is XML of another kind.
     #[error("it is {0} and not MTConnectDevices")]
     OtherDocument(String),
-    /// It has no end.
+    /// It ends before its elements do.
     #[error("it ends in the middle")]
     Truncated,
-    /// It is too large.
+    /// It has more data items than are read.
     #[error("it has more than {ITEMS_MAX} data items")]
     TooManyItems,
-    /// It is too deep.
+    /// It is nested deeper than any device.
     #[error("its elements are nested deeper than {DEPTH_MAX}")]
     TooDeep,
 }
 
-/// Every device of a document.
+/// Every device of a document, also the agent itself.
 ///
 /// # Errors
 /// See [`ModelError`].
@@ -169,7 +169,7 @@ struct ModelBuilder {
 }
 
 impl ModelBuilder {
-    fn begin_element(&mut self, element: &Element) -> Result<(), ModelError> {
+    fn begin_element(&mut self, element: &XmlElement) -> Result<(), ModelError> {
         let parent = self.stack.last().map_or("", String::as_str);
         match (parent, element.name.as_str()) {
             ("", name) => self.root = Some(name.to_owned()),
@@ -194,7 +194,7 @@ impl ModelBuilder {
         if self.stack.len() > DEPTH_MAX { Err(ModelError::TooDeep) } else { Ok(()) }
     }
 
-    fn begin_device(&mut self, name: &str, element: &Element) {
+    fn begin_device(&mut self, name: &str, element: &XmlElement) {
         self.kinds.clear();
         let text = |attribute| element.copy_attribute(attribute).unwrap_or_default();
         self.devices.push(Device {
@@ -206,7 +206,7 @@ impl ModelBuilder {
         self.begin_component(name, element);
     }
 
-    fn begin_component(&mut self, kind: &str, element: &Element) {
+    fn begin_component(&mut self, kind: &str, element: &XmlElement) {
         let parent = self.parts.last().map(|(_, place)| *place);
         let Some(device) = self.devices.last_mut() else { return };
         let place = device.components.len();
@@ -221,7 +221,7 @@ impl ModelBuilder {
         self.parts.push((self.stack.len(), place));
     }
 
-    fn add_item(&mut self, element: &Element) -> Result<(), ModelError> {
+    fn add_item(&mut self, element: &XmlElement) -> Result<(), ModelError> {
         let (Some(id), Some(kind)) = (element.copy_attribute("id"), element.copy_attribute("type")) else {
             return Ok(());
         };

@@ -25,7 +25,7 @@ pub(crate) struct MultipartSplitter {
     /// Bytes of the buffer that belong to parts that have been taken.
     done: usize,
     /// Where to go on looking for the end of a part without a length, from `done`.
-    looked: usize,
+    searched_to: usize,
 }
 
 /// The boundary that a content type names; `None` for an answer in one part.
@@ -43,7 +43,7 @@ impl MultipartSplitter {
     pub(crate) fn new(boundary: &str) -> Self {
         // Some agents name the boundary with the hyphens that stand before it.
         let delimiter = [b"--", boundary.strip_prefix("--").unwrap_or(boundary).as_bytes()].concat();
-        Self { delimiter, buffer: Vec::new(), done: 0, looked: 0 }
+        Self { delimiter, buffer: Vec::new(), done: 0, searched_to: 0 }
     }
 
     /// The place where bytes of the body are appended.
@@ -69,16 +69,16 @@ impl MultipartSplitter {
             Some(length) if body.len() < length => None,
             Some(length) => Some(length),
             None => {
-                let from = self.looked.min(body.len());
+                let from = self.searched_to.min(body.len());
                 let found = memmem::find(&body[from..], &self.delimiter).map(|at| from + at);
-                self.looked = body.len().saturating_sub(self.delimiter.len());
+                self.searched_to = body.len().saturating_sub(self.delimiter.len());
                 found
             }
         };
         let Some(end) = end else { return self.wait_for(body.len()) };
         let part = body[..end].to_vec();
         self.done += head_at + body_at + end;
-        self.looked = 0;
+        self.searched_to = 0;
         Ok(Some(part))
     }
 

@@ -5,7 +5,7 @@ use adapter_core::own::OwnRead;
 /// A data item of a device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OwnDataItem {
-    /// Identifier or name.
+    /// Its identifier, or its name where only one has it.
     pub word: String,
 }
 

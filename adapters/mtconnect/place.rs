@@ -6,7 +6,7 @@ use adapter_core::driver::SourceProblem;
 
 /// Where a component stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Place {
+pub(crate) enum ComponentPlace {
     /// The device as a whole.
     Device,
     Controller,
@@ -26,29 +26,29 @@ pub(crate) enum Place {
 const SPEEDS: [&str; 2] = ["ROTARY_VELOCITY", "SPINDLE_SPEED"];
 
 /// The place of every component of a device. `spindle` is what the address says.
-pub(crate) fn find_places(device: &Device, spindle: Option<&str>) -> (Vec<Place>, Vec<SourceProblem>) {
+pub(crate) fn find_places(device: &Device, spindle: Option<&str>) -> (Vec<ComponentPlace>, Vec<SourceProblem>) {
     let (spindle, problem) = find_spindle(device, spindle);
-    let mut places: Vec<Place> = Vec::with_capacity(device.components.len());
+    let mut places: Vec<ComponentPlace> = Vec::with_capacity(device.components.len());
     let mut paths = 0_u8;
     for (index, part) in device.components.iter().enumerate() {
         let place = match part.kind.as_str() {
-            _ if Some(index) == spindle => Place::Spindle,
-            _ if index == 0 => Place::Device,
-            "Controller" => Place::Controller,
+            _ if Some(index) == spindle => ComponentPlace::Spindle,
+            _ if index == 0 => ComponentPlace::Device,
+            "Controller" => ComponentPlace::Controller,
             "Path" => {
                 paths = paths.saturating_add(1);
-                Place::Path(paths)
+                ComponentPlace::Path(paths)
             }
-            "Linear" => find_axis_letter(part).map_or(Place::Elsewhere, Place::Linear),
-            "Motor" if part.parent.is_some() && part.parent == spindle => Place::SpindleMotor,
-            "Electric" => Place::Electric,
-            "Coolant" => Place::Coolant,
-            "Environmental" => Place::Environment,
-            _ => Place::Elsewhere,
+            "Linear" => find_axis_letter(part).map_or(ComponentPlace::Elsewhere, ComponentPlace::Linear),
+            "Motor" if part.parent.is_some() && part.parent == spindle => ComponentPlace::SpindleMotor,
+            "Electric" => ComponentPlace::Electric,
+            "Coolant" => ComponentPlace::Coolant,
+            "Environmental" => ComponentPlace::Environment,
+            _ => ComponentPlace::Elsewhere,
         };
         // A second axis of the same letter belongs to another turret.
-        let is_second = matches!(place, Place::Linear(_)) && places.contains(&place);
-        places.push(if is_second { Place::Elsewhere } else { place });
+        let is_second = matches!(place, ComponentPlace::Linear(_)) && places.contains(&place);
+        places.push(if is_second { ComponentPlace::Elsewhere } else { place });
     }
     (places, problem.into_iter().collect())
 }
@@ -124,11 +124,11 @@ fn build_unknown_spindle_problem(device: &Device, wanted: &str) -> SourceProblem
 }
 
 /// The path that a component belongs to; `None` for what belongs to the whole control.
-pub(crate) fn find_path(device: &Device, places: &[Place], component: usize) -> Option<u8> {
+pub(crate) fn find_path(device: &Device, places: &[ComponentPlace], component: usize) -> Option<u8> {
     let mut at = Some(component);
     // A component stands behind the one that it is a part of, so that this ends.
     while let Some(index) = at {
-        if let Some(Place::Path(path)) = places.get(index) {
+        if let Some(ComponentPlace::Path(path)) = places.get(index) {
             return Some(*path);
         }
         at = device.components.get(index).and_then(|part| part.parent).filter(|parent| *parent < index);

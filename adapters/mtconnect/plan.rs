@@ -3,11 +3,11 @@
 use crate::address::MtConnectTarget;
 use crate::model::{Category, DataItem, Device};
 use crate::own_data_item::OwnDataItem;
-use crate::place::{Place, find_path, find_places, name_component};
-use crate::rows::{LETTERS, ROWS, Row, TEMPERATURE, TEMPERATURES, Where};
+use crate::place::{ComponentPlace, find_path, find_places, name_component};
+use crate::rows::{ChannelRow, LETTERS, ROWS, TEMPERATURE, TEMPERATURES, Where};
 use crate::standard::find_unit;
 use crate::streams::ConditionLevel;
-use crate::words::Form;
+use crate::words::ObservationForm;
 use adapter_core::channel::{ChannelId, find_nearest_name, on_path};
 use adapter_core::conversion::{Conversion, find_conversion, is_known};
 use adapter_core::driver::SourceProblem;
@@ -18,7 +18,7 @@ use std::collections::{BTreeMap, HashMap};
 #[derive(Debug, Clone)]
 pub(crate) struct FedChannel {
     pub(crate) channel: ChannelId,
-    pub(crate) form: Form,
+    pub(crate) form: ObservationForm,
     /// `None` where the unit of the item does not fit.
     pub(crate) conversion: Option<Conversion>,
     /// The user's own channel.
@@ -36,7 +36,7 @@ pub(crate) struct ConditionChannel {
 /// What becomes of the observations of a device.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ChannelPlan {
-    pub(crate) fed: HashMap<String, Vec<FedChannel>>,
+    pub(crate) channels_by_item: HashMap<String, Vec<FedChannel>>,
     pub(crate) conditions: Vec<ConditionChannel>,
     /// The item that tells whether the adapter reaches the control.
     pub(crate) availability: Option<String>,
@@ -50,7 +50,7 @@ type Fit = [usize; 4];
 
 struct Candidates {
     fit: Fit,
-    form: Form,
+    form: ObservationForm,
     /// Places of the items in the device that fit as well as each other.
     items: Vec<usize>,
 }
@@ -109,7 +109,7 @@ impl ChannelPlan {
         target.own.iter().for_each(|own| plan.add_own(device, own));
         plan.add_temperatures(device);
         plan.add_conditions(device, target, &places);
-        let fed = plan.fed.values().flatten().map(|fed| fed.channel);
+        let fed = plan.channels_by_item.values().flatten().map(|fed| fed.channel);
         let fed: Vec<ChannelId> = fed.chain(plan.conditions.iter().map(|condition| condition.channel)).collect();
         plan.absent = list_channels(target).into_iter().filter(|channel| !fed.contains(channel)).collect();
         plan
@@ -136,14 +136,14 @@ impl ChannelPlan {
         }
     }
 
-    fn add_item(&mut self, item: &DataItem, channel: ChannelId, form: Form, own: Option<Own<OwnDataItem>>) {
+    fn add_item(&mut self, item: &DataItem, channel: ChannelId, form: ObservationForm, own: Option<Own<OwnDataItem>>) {
         let conversion = if form.is_number() { self.find_conversion(item, channel) } else { None };
-        self.fed.entry(item.id.clone()).or_default().push(FedChannel { channel, form, conversion, own });
+        self.channels_by_item.entry(item.id.clone()).or_default().push(FedChannel { channel, form, conversion, own });
     }
 
     fn add_own(&mut self, device: &Device, own: &Own<OwnDataItem>) {
         let word = &own.item.word;
-        let form = if own.channel.new.unit.is_empty() { Form::Text } else { Form::Number };
+        let form = if own.channel.new.unit.is_empty() { ObservationForm::Text } else { ObservationForm::Number };
         match device.find_item(word) {
             Some(item) if item.category != Category::Condition && item.is_value => {
                 self.add_item(item, own.id, form, Some(own.clone()));
@@ -175,18 +175,19 @@ impl ChannelPlan {
             item.kind == TEMPERATURE
                 && item.category == Category::Sample
                 && item.is_value
-                && !self.fed.contains_key(&item.id)
+                && !self.channels_by_item.contains_key(&item.id)
         };
         let free: Vec<&DataItem> = device.items.iter().filter(is_free).take(TEMPERATURES).collect();
         for (item, number) in free.into_iter().zip(1..) {
-            let taken = |channel: &ChannelId| !self.fed.values().flatten().any(|fed| fed.channel == *channel);
+            let taken =
+                |channel: &ChannelId| !self.channels_by_item.values().flatten().any(|fed| fed.channel == *channel);
             if let Some(channel) = ChannelId::from_name(&name_temperature(number)).filter(taken) {
-                self.add_item(item, channel, Form::Number, None);
+                self.add_item(item, channel, ObservationForm::Number, None);
             }
         }
     }
 
-    fn add_conditions(&mut self, device: &Device, target: &MtConnectTarget, places: &[Place]) {
+    fn add_conditions(&mut self, device: &Device, target: &MtConnectTarget, places: &[ComponentPlace]) {
         let conditions: Vec<&DataItem> =
             device.items.iter().filter(|item| item.category == Category::Condition).collect();
         let further = |item: &DataItem| {
@@ -244,7 +245,11 @@ fn describe_item(device: &Device, item: &DataItem) -> String {
 }
 
 /// Of every channel the items that fit best.
-fn find_candidates(device: &Device, target: &MtConnectTarget, places: &[Place]) -> BTreeMap<ChannelId, Candidates> {
+fn find_candidates(
+    device: &Device,
+    target: &MtConnectTarget,
+    places: &[ComponentPlace],
+) -> BTreeMap<ChannelId, Candidates> {
     let mut found: BTreeMap<ChannelId, Candidates> = BTreeMap::new();
     for (index, item) in device.items.iter().enumerate() {
         if !item.is_value || item.category == Category::Condition {
@@ -266,12 +271,12 @@ fn find_candidates(device: &Device, target: &MtConnectTarget, places: &[Place]) 
     found
 }
 
-fn rank_item(row: &Row, item: &DataItem, places: &[Place]) -> Option<(usize, usize)> {
+fn rank_item(row: &ChannelRow, item: &DataItem, places: &[ComponentPlace]) -> Option<(usize, usize)> {
     let place_rank = row.place.rank_place(*places.get(item.component)?)?;
     let sub_type = item.sub_type.as_deref().unwrap_or("");
     let sub_rank = row.sub_types.iter().position(|known| *known == sub_type)?;
     match row.form {
-        Form::OfComposition(kind) if item.composition.as_deref() != Some(kind) => None,
+        ObservationForm::OfComposition(kind) if item.composition.as_deref() != Some(kind) => None,
         _ => Some((place_rank, sub_rank)),
     }
 }
@@ -288,14 +293,14 @@ fn rank_likeness(item: &DataItem) -> usize {
 }
 
 fn find_row_channel(
-    row: &Row,
+    row: &ChannelRow,
     device: &Device,
     target: &MtConnectTarget,
-    places: &[Place],
+    places: &[ComponentPlace],
     component: usize,
 ) -> Option<ChannelId> {
     let name = match (row.place, places.get(component)?) {
-        (Where::Axis, Place::Linear(letter)) => name_axis_channel(*letter, row.channel),
+        (Where::Axis, ComponentPlace::Linear(letter)) => name_axis_channel(*letter, row.channel),
         (Where::Control, _) => {
             let path = find_path(device, places, component);
             let at = path.map_or(Some(0), |path| target.paths.iter().position(|known| *known == path))?;

@@ -74,7 +74,7 @@ fn plan_of(document: &str, target: &MtConnectTarget) -> ChannelPlan {
 
 /// Item and number 100 in the channel's unit.
 fn fed(plan: &ChannelPlan, channel: &str) -> Option<(String, Option<f64>)> {
-    let mut all = plan.fed.iter().flat_map(|(item, fed)| fed.iter().map(move |fed| (item, fed)));
+    let mut all = plan.channels_by_item.iter().flat_map(|(item, fed)| fed.iter().map(move |fed| (item, fed)));
     let (item, fed) = all.find(|(_, fed)| fed.channel.name() == channel)?;
     let number = fed.conversion.map(|conversion| (conversion.convert_number(100.0) * 1e6).round() / 1e6);
     Some((item.clone(), number))

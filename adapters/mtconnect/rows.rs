@@ -3,8 +3,8 @@
 //! Where several rows name one channel, an item of the row that stands first is taken, and of one row the subtype that stands first. A subtype
 //! of `""` is an item without one.
 
-use crate::place::Place;
-use crate::words::Form;
+use crate::place::ComponentPlace;
+use crate::words::ObservationForm;
 
 /// Kinds of places that a row looks at, the likeliest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,17 +23,17 @@ pub(crate) enum Where {
 
 impl Where {
     /// How likely a place is; `None` where it is none of these.
-    pub(crate) fn rank_place(self, place: Place) -> Option<usize> {
+    pub(crate) fn rank_place(self, place: ComponentPlace) -> Option<usize> {
         match (self, place) {
-            (Self::Control, Place::Path(_))
-            | (Self::Spindle, Place::Spindle)
-            | (Self::SpindleMotor, Place::SpindleMotor)
-            | (Self::Axis, Place::Linear(_))
-            | (Self::Supply, Place::Electric)
-            | (Self::Coolant, Place::Coolant)
-            | (Self::Environment, Place::Environment) => Some(0),
-            (Self::Control, Place::Controller) | (Self::Supply, Place::Device) => Some(1),
-            (Self::Control, Place::Device) => Some(2),
+            (Self::Control, ComponentPlace::Path(_))
+            | (Self::Spindle, ComponentPlace::Spindle)
+            | (Self::SpindleMotor, ComponentPlace::SpindleMotor)
+            | (Self::Axis, ComponentPlace::Linear(_))
+            | (Self::Supply, ComponentPlace::Electric)
+            | (Self::Coolant, ComponentPlace::Coolant)
+            | (Self::Environment, ComponentPlace::Environment) => Some(0),
+            (Self::Control, ComponentPlace::Controller) | (Self::Supply, ComponentPlace::Device) => Some(1),
+            (Self::Control, ComponentPlace::Device) => Some(2),
             _ => None,
         }
     }
@@ -41,12 +41,12 @@ impl Where {
 
 /// One way to a channel.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Row {
+pub(crate) struct ChannelRow {
     pub(crate) channel: &'static str,
     pub(crate) place: Where,
     pub(crate) kind: &'static str,
     pub(crate) sub_types: &'static [&'static str],
-    pub(crate) form: Form,
+    pub(crate) form: ObservationForm,
 }
 
 const fn define_row(
@@ -54,9 +54,9 @@ const fn define_row(
     place: Where,
     kind: &'static str,
     sub_types: &'static [&'static str],
-    form: Form,
-) -> Row {
-    Row { channel, place, kind, sub_types, form }
+    form: ObservationForm,
+) -> ChannelRow {
+    ChannelRow { channel, place, kind, sub_types, form }
 }
 
 const PLAIN: &[&str] = &[""];
@@ -65,12 +65,12 @@ const ACTUAL: &[&str] = &["ACTUAL", ""];
 const PROGRAMMED: &[&str] = &["PROGRAMMED", "COMMANDED"];
 const OVERRIDE: &[&str] = &["OVERRIDE"];
 
-use Form::{Block, Coordinate, EmergencyStop, Execution, Mode, Number, Program, Text, Tool};
+use ObservationForm::{Block, Coordinate, EmergencyStop, Execution, Mode, Number, Program, Text, Tool};
 use Where::{Axis, Control, Coolant, Environment, Spindle, SpindleMotor, Supply};
 
-/// Every row.
+/// Every row, the likeliest of a channel first.
 #[rustfmt::skip]
-pub(crate) const ROWS: &[Row] = &[
+pub(crate) const ROWS: &[ChannelRow] = &[
     define_row("execution", Control, "EXECUTION", PLAIN, Execution),
     define_row("mode", Control, "CONTROLLER_MODE", PLAIN, Mode),
     define_row("program", Control, "PROGRAM", &["ACTIVE", ""], Program),
@@ -121,8 +121,8 @@ pub(crate) const ROWS: &[Row] = &[
     define_row("coolant_temperature_c", Coolant, "TEMPERATURE", ACTUAL, Number),
     define_row("ambient_temperature_c", Environment, "TEMPERATURE", ACTUAL, Number),
     define_row("motor_temperature_c", SpindleMotor, "TEMPERATURE", ACTUAL, Number),
-    define_row("motor_temperature_c", Spindle, "TEMPERATURE", ACTUAL, Form::OfComposition("MOTOR")),
-    define_row("bearing_temperature_c", Spindle, "TEMPERATURE", ACTUAL, Form::OfComposition("BEARING")),
+    define_row("motor_temperature_c", Spindle, "TEMPERATURE", ACTUAL, ObservationForm::OfComposition("MOTOR")),
+    define_row("bearing_temperature_c", Spindle, "TEMPERATURE", ACTUAL, ObservationForm::OfComposition("BEARING")),
 ];
 
 /// Temperatures that no row takes, in the order of the device.

@@ -25,7 +25,7 @@ pub(crate) struct AgentState {
     next: u64,
     buffer: VecDeque<BufferedObservation>,
     pub(crate) buffer_size: usize,
-    /// Answers in parts?
+    /// Does it answer in parts, where it is asked to?
     pub(crate) streams: bool,
     /// Bytes that are sent for a request whose path contains this word, instead of an answer.
     pub(crate) instead: Option<(&'static str, Vec<u8>)>,
@@ -33,6 +33,8 @@ pub(crate) struct AgentState {
     pub(crate) silent: Option<&'static str>,
     /// Sends its answers to requests whose path contains this word byte by byte.
     pub(crate) slow: Option<&'static str>,
+    /// Sends a part also when nothing has changed?
+    pub(crate) has_heartbeat: bool,
     /// Takes the name of a device before a request?
     pub(crate) takes_names: bool,
     /// Sends parts not more often than this.
@@ -123,7 +125,7 @@ impl AgentState {
 pub(crate) struct ScriptedAgent {
     pub(crate) port: u16,
     state: Arc<Mutex<AgentState>>,
-    stopped: Arc<AtomicBool>,
+    is_stopped: Arc<AtomicBool>,
 }
 
 impl ScriptedAgent {
@@ -140,6 +142,7 @@ impl ScriptedAgent {
             instead: None,
             silent: None,
             slow: None,
+            has_heartbeat: true,
             takes_names: true,
             least_interval_ms: 0,
             ends_streams: false,
@@ -156,7 +159,7 @@ impl ScriptedAgent {
                 std::thread::spawn(move || answer(stream, &state, &stop));
             }
         });
-        Self { port, state, stopped }
+        Self { port, state, is_stopped: stopped }
     }
 
     pub(crate) fn lock(&self) -> MutexGuard<'_, AgentState> {
@@ -166,7 +169,7 @@ impl ScriptedAgent {
 
 impl Drop for ScriptedAgent {
     fn drop(&mut self) {
-        self.stopped.store(true, Ordering::SeqCst);
+        self.is_stopped.store(true, Ordering::SeqCst);
         let _ = TcpStream::connect(("127.0.0.1", self.port));
     }
 }
@@ -265,9 +268,14 @@ fn stream_parts(
             continue;
         }
         let (body, next) = known.take_sample(from, count);
-        let ends = known.ends_streams;
+        let (ends, has_heartbeat) = (known.ends_streams, known.has_heartbeat);
         drop(known);
+        let is_quiet = next == from && !has_heartbeat;
         from = next;
+        if is_quiet {
+            std::thread::sleep(interval);
+            continue;
+        }
         let part = format!("\r\n--edge\r\nContent-type: text/xml\r\nContent-length: {}\r\n\r\n{body}\r\n", body.len());
         if stream.write_all(part.as_bytes()).is_err() || ends {
             return;

@@ -47,7 +47,7 @@ pub(crate) struct SequenceTrack {
     /// Number of the oldest observation that the agent still had when it was last noticed that others are gone.
     oldest: Option<u64>,
     /// Observations that came although they had been read.
-    pub(crate) repeated: u64,
+    pub(crate) repeated_count: u64,
 }
 
 /// What is new in a document.
@@ -109,7 +109,7 @@ impl SequenceTrack {
         let mut fresh: Vec<Observation> = observations.into_iter().filter(is_new).collect();
         fresh.sort_by_key(|observation| observation.sequence);
         fresh.dedup_by_key(|observation| observation.sequence);
-        self.repeated += adapter_core::integer::widen_to_u64(count - fresh.len());
+        self.repeated_count += adapter_core::integer::widen_to_u64(count - fresh.len());
         let behind = fresh.last().and_then(|last| last.sequence).map(|last| last.saturating_add(1));
         self.next = self.next.max(behind).max(header.next_sequence);
         Ok(NewObservations { is_newest: fresh.is_empty(), observations: fresh })
@@ -153,7 +153,7 @@ mod tests {
         let resume = track.resume(&header("1", 1, 10), Some(9));
         assert_eq!(resume, Resume { from: Some(10), gap: None, is_restart: false });
         let fresh = track.accept(&header("1", 1, 13), observe(&[12, 10, 9, 11, 10])).expect("goes on");
-        assert_eq!((numbers(&fresh), track.repeated, track.next()), (vec![10, 11, 12], 2, Some(13)));
+        assert_eq!((numbers(&fresh), track.repeated_count, track.next()), (vec![10, 11, 12], 2, Some(13)));
         // Other devices of the agent have the numbers between.
         let fresh = track.accept(&header("1", 1, 20), observe(&[17])).expect("goes on");
         assert_eq!((numbers(&fresh), track.next()), (vec![17], Some(20)));

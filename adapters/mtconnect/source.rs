@@ -3,14 +3,14 @@
 use crate::address::MtConnectTarget;
 use crate::agent::{AgentLink, DocumentError, StreamsDocument, parse_streams};
 use crate::device_clock::{DeviceClock, parse_time};
-use crate::feed::{Feed, LiveStream};
+use crate::feed::{LiveStream, ObservationFeed};
 use crate::held_values::HeldValues;
 use crate::history::ReadingHistory;
 use crate::http::HttpError;
 use crate::model::Device;
 use crate::plan::{ChannelPlan, list_channels};
 use crate::sequence::{Break, SequenceTrack};
-use crate::streams::Observation;
+use crate::streams::{Observation, UNAVAILABLE};
 use adapter_core::channel::ChannelId;
 use adapter_core::clock::{Clock, SECOND_NS, TimeNs};
 use adapter_core::driver::{Fact, Offer, Source, SourceError, SourceProblem};
@@ -40,7 +40,7 @@ pub struct MtConnectSource {
     /// The device as it was described last, and what becomes of its observations.
     device: Option<Device>,
     plan: ChannelPlan,
-    held: HeldValues,
+    values: HeldValues,
     track: SequenceTrack,
     clock: DeviceClock,
     history: ReadingHistory,
@@ -49,10 +49,10 @@ pub struct MtConnectSource {
 
 /// What holds as long as a connection does.
 struct AgentSession {
-    feed: Feed,
+    feed: ObservationFeed,
     /// Most observations that are asked for at once.
     count: u64,
-    probed: Instant,
+    probed_at: Instant,
     /// Until this number what comes is the past.
     catch_up_to: Option<u64>,
 }
@@ -60,8 +60,8 @@ struct AgentSession {
 impl AgentSession {
     fn find_part_interval(&self) -> Option<Duration> {
         match &self.feed {
-            Feed::Stream(stream) => stream.find_part_interval(),
-            Feed::Questions => None,
+            ObservationFeed::Stream(stream) => stream.find_part_interval(),
+            ObservationFeed::Questions => None,
         }
     }
 }
@@ -90,7 +90,7 @@ impl MtConnectSource {
             session: None,
             device: None,
             plan: ChannelPlan::default(),
-            held: HeldValues::default(),
+            values: HeldValues::default(),
             track: SequenceTrack::default(),
             clock: DeviceClock::default(),
             history: ReadingHistory::default(),
@@ -121,7 +121,7 @@ impl MtConnectSource {
     /// Asks for device and values, and for the observations from there on.
     fn open_session(&mut self, clock: &dyn Clock, out: &mut Vec<Reading>) -> Result<AgentSession, SourceError> {
         let device = self.link.probe_device()?;
-        let probed = Instant::now();
+        let probed_at = Instant::now();
         let began_ns = clock.now_ns();
         let current = self.link.ask_current(&device)?;
         let stamp = Stamp::of_request(began_ns, clock.now_ns());
@@ -129,7 +129,7 @@ impl MtConnectSource {
         let resume = self.track.resume(&current.header, newest);
         if let Some(gap) = resume.gap {
             self.history.record_gap(stamp.mid_ns, gap);
-            self.held.clear_conditions();
+            self.values.clear_conditions();
         }
         if resume.is_restart {
             self.history.record_restart(stamp.mid_ns);
@@ -137,14 +137,14 @@ impl MtConnectSource {
         if resume.is_restart || self.device.as_ref() != Some(&device) {
             self.history.model_changes += u64::from(self.device.as_ref().is_some_and(|known| *known != device));
             self.plan = ChannelPlan::from_device(&device, &self.target);
-            self.held = HeldValues::default();
+            self.values = HeldValues::default();
         }
         // What comes again in the answer to `sample` is taken there, with its time.
         for observation in &current.observations {
             let comes_again = observation.sequence.is_some() && observation.sequence >= resume.from;
             let is_standing = resume.gap.is_some() && observation.condition.is_some();
-            if (!comes_again || is_standing) && !self.held.holds_observation(&self.plan, observation) {
-                self.held.record_observation(&self.plan, observation, stamp, &mut Vec::new());
+            if (!comes_again || is_standing) && !self.values.holds_observation(&self.plan, observation) {
+                self.values.record_observation(&self.plan, observation, stamp, &mut Vec::new());
             }
         }
         let count = current.header.buffer_size.unwrap_or(COUNT_MAX).clamp(1, COUNT_MAX);
@@ -152,32 +152,32 @@ impl MtConnectSource {
         self.device = Some(device);
         self.history.connections += 1;
         let behind = current.header.next_sequence.or(newest.map(|newest| newest.saturating_add(1)));
-        let session = AgentSession { feed, count, probed, catch_up_to: behind.filter(|_| behind > resume.from) };
+        let session = AgentSession { feed, count, probed_at, catch_up_to: behind.filter(|_| behind > resume.from) };
         if session.catch_up_to.is_none() {
-            self.held.append_all(&self.plan, stamp, out);
+            self.values.append_all(&self.plan, stamp, out);
         }
         Ok(session)
     }
 
-    fn open_feed(&mut self, device: &Device, count: u64) -> Result<Feed, SourceError> {
+    fn open_feed(&mut self, device: &Device, count: u64) -> Result<ObservationFeed, SourceError> {
         if self.broken_streams >= BROKEN_STREAMS_MAX {
-            return Ok(Feed::Questions);
+            return Ok(ObservationFeed::Questions);
         }
         let response = match self.link.open_sample(device, self.track.next(), count, self.interval()) {
             // An agent that does not know parts, or not so often, answers a plain question.
             Err(SourceError::Refused { .. }) => {
-                return self.link.ask_sample(device, self.track.next(), count).map(|_| Feed::Questions);
+                return self.link.ask_sample(device, self.track.next(), count).map(|_| ObservationFeed::Questions);
             }
             response => response?,
         };
         let to_error = |error| self.link.to_line_error("sample", error);
         match LiveStream::from_response(response, self.link.silence).map_err(to_error)? {
-            Ok(stream) => Ok(Feed::Stream(stream)),
+            Ok(stream) => Ok(ObservationFeed::Stream(stream)),
             // An answer in one part says whether the question was understood; its observations are asked for again.
             Err(response) => {
                 let body = response.read_body(self.link.deadline()).map_err(to_error)?;
                 parse_streams(&body).map_err(|error| self.link.to_source_error("sample", error))?;
-                Ok(Feed::Questions)
+                Ok(ObservationFeed::Questions)
             }
         }
     }
@@ -189,19 +189,19 @@ impl MtConnectSource {
         clock: &dyn Clock,
         out: &mut Vec<Reading>,
     ) -> Result<(), SessionEnd> {
-        if session.probed.elapsed() >= PROBE_EVERY {
-            session.probed = Instant::now();
+        if session.probed_at.elapsed() >= PROBE_EVERY {
+            session.probed_at = Instant::now();
             if self.device.as_ref() != Some(&self.link.probe_device()?) {
                 return Err(SessionEnd::Reopen);
             }
         }
         let interval = self.interval();
         let is_new = match &mut session.feed {
-            Feed::Stream(stream) => {
+            ObservationFeed::Stream(stream) => {
                 let parts = stream.take_parts(interval);
                 let so_far = stream.parts;
                 let parts = parts.map_err(|error| self.end_stream(error, so_far))?;
-                if so_far > 1 {
+                if stream.is_steady() {
                     self.broken_streams = 0;
                 }
                 let arrived_ns = clock.now_ns();
@@ -211,7 +211,7 @@ impl MtConnectSource {
                 }
                 !parts.is_empty()
             }
-            Feed::Questions => {
+            ObservationFeed::Questions => {
                 self.ask_questions(session.count, clock, out)?;
                 true
             }
@@ -223,7 +223,7 @@ impl MtConnectSource {
                 session.find_part_interval().map_or(self.interval(), |known| known.max(self.interval())),
             ) / 2;
             let stamp = Stamp { mid_ns: clock.now_ns().saturating_sub(half_ns), half_width_ns: half_ns };
-            self.held.append_all(&self.plan, stamp, out);
+            self.values.append_all(&self.plan, stamp, out);
         }
         Ok(())
     }
@@ -242,7 +242,8 @@ impl MtConnectSource {
     }
 
     fn end_stream(&mut self, error: HttpError, parts: u64) -> SessionEnd {
-        self.broken_streams += u32::from(parts < 2);
+        // An agent that does not send while nothing changes looks like a broken line: it is asked instead.
+        self.broken_streams += u32::from(parts < 2 || error == HttpError::Timeout);
         match error {
             // An agent may end its answer at any time; where it is gone, the next question says so.
             HttpError::Line(_) => SessionEnd::Reopen,
@@ -279,15 +280,15 @@ impl MtConnectSource {
             self.history.unusable += u64::from(told_ns.is_none());
             let mid_ns = told_ns.map_or(arrived_ns, |told_ns| self.clock.convert_time(told_ns, arrived_ns));
             let stamp = Stamp { mid_ns, half_width_ns: saturate_to_ns(self.interval()) / 2 };
-            self.held.record_observation(&self.plan, observation, stamp, out);
+            self.values.record_observation(&self.plan, observation, stamp, out);
         }
         Ok(fresh.is_newest)
     }
 
     fn describe_way(&self) -> &'static str {
         match self.session.as_ref().map(|session| &session.feed) {
-            Some(Feed::Stream(_)) => "one answer that does not end",
-            Some(Feed::Questions) => "a question at every poll",
+            Some(ObservationFeed::Stream(_)) => "one answer that does not end",
+            Some(ObservationFeed::Questions) => "a question at every poll",
             None => "not connected",
         }
     }
@@ -337,7 +338,7 @@ impl Source for MtConnectSource {
     #[expect(clippy::cast_precision_loss, reason = "a count, and nanoseconds that are shown in seconds")]
     fn collect_facts(&self) -> Vec<Fact> {
         let mut facts = self.history.collect_facts();
-        facts.push(Fact::from_number("repeated_observations", self.track.repeated as f64));
+        facts.push(Fact::from_number("repeated_observations", self.track.repeated_count as f64));
         facts.push(Fact::from_text("way", self.describe_way()));
         facts.extend(self.device.as_ref().map(|device| Fact::from_text("device", &device.name)));
         let difference_ns = self.clock.find_difference_ns();
@@ -346,7 +347,7 @@ impl Source for MtConnectSource {
     }
 
     fn list_problems(&self) -> Vec<SourceProblem> {
-        let of_device = self.plan.problems.iter().cloned().chain(self.held.list_problems());
+        let of_device = self.plan.problems.iter().cloned().chain(self.values.list_problems());
         of_device.chain(self.history.list_problems()).chain(self.find_clock_problem()).collect()
     }
 
@@ -357,13 +358,14 @@ impl Source for MtConnectSource {
         let plan = ChannelPlan::from_device(&device, &self.target);
         let offers = device.items.iter().map(|item| {
             let mut of_item = current.observations.iter().filter(|observation| observation.item == item.id);
-            let channel = plan.fed.get(&item.id).and_then(|fed| fed.first()).map(|fed| fed.channel);
+            let channel = plan.channels_by_item.get(&item.id).and_then(|fed| fed.first()).map(|fed| fed.channel);
             let condition = plan.conditions.iter().find(|condition| condition.items.contains(&item.id));
             Offer {
                 name: item.id.clone(),
-                says: of_item
-                    .next()
-                    .map_or_else(|| Err("nothing".to_owned()), |found| describe_value(found, item.units.as_deref())),
+                says: match of_item.next() {
+                    Some(found) => describe_value(found, item.units.as_deref()).ok_or_else(|| UNAVAILABLE.to_owned()),
+                    None => Err("nothing".to_owned()),
+                },
                 channel: channel.or(condition.map(|condition| condition.channel)),
             }
         });
@@ -371,13 +373,12 @@ impl Source for MtConnectSource {
     }
 }
 
-fn describe_value(observation: &Observation, units: Option<&str>) -> Result<String, String> {
+/// What is shown of an observation; `None` where the agent has no value.
+fn describe_value(observation: &Observation, units: Option<&str>) -> Option<String> {
     if let Some(fields) = &observation.condition {
-        return Ok(format!("{:?} {}", fields.level, observation.text).trim().to_owned());
+        return Some(format!("{:?} {}", fields.level, observation.text).trim().to_owned());
     }
     let shown: String = observation.text.chars().take(SHOWN_MAX).collect();
-    if shown == crate::streams::UNAVAILABLE {
-        return Err(shown);
-    }
-    Ok(units.map_or_else(|| shown.clone(), |units| format!("{shown} {units}")))
+    let has_value = shown != UNAVAILABLE;
+    has_value.then(|| units.map_or_else(|| shown.clone(), |units| format!("{shown} {units}")))
 }

@@ -263,6 +263,21 @@ fn agents_that_take_no_name_and_agents_that_send_seldom_are_read_at_their_pace()
 }
 
 #[test]
+fn an_agent_that_sends_nothing_while_nothing_changes_is_asked_in_the_end() {
+    let agent = ScriptedAgent::start(TURNING_CENTRE);
+    agent.lock().has_heartbeat = false;
+    let (mut source, mut readings) = (open(&agent), Vec::new());
+    poll_until(&mut source, &mut readings, |source, _| {
+        source.query_identity().get(4).is_some_and(|(_, way)| way == "a question at every poll")
+    });
+    agent.lock().observe("PathFeedrate", "Fact", "20");
+    poll_until(&mut source, &mut readings, |_, readings| {
+        last(readings, "feed_mm_min") == Some(Ok(Value::Number(1200.0)))
+    });
+    assert_eq!(fact(&source, "observations"), 1.0);
+}
+
+#[test]
 fn an_agent_that_refuses_parts_is_asked_at_every_poll() {
     let agent = ScriptedAgent::start(TURNING_CENTRE);
     agent.lock().instead = Some(("interval=", b"HTTP/1.1 400 Bad\r\nContent-Length: 0\r\n\r\n".to_vec()));

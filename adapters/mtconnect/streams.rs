@@ -1,6 +1,6 @@
 //! What an agent says: MTConnectStreams, the answer to `current` and `sample`, and MTConnectError.
 
-use crate::xml::{Element, XmlError, XmlEvent, XmlReader};
+use crate::xml::{XmlElement, XmlError, XmlEvent, XmlReader};
 use std::io::BufRead;
 
 /// The head of a document. What an agent leaves out is `None`.
@@ -46,7 +46,7 @@ impl ConditionLevel {
 /// What belongs to a condition and to nothing else.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConditionFields {
-    /// Its level.
+    /// How serious it is.
     pub level: ConditionLevel,
     /// Type of the condition, for example `SYSTEM`.
     pub kind: String,
@@ -54,7 +54,7 @@ pub struct ConditionFields {
     pub native_code: Option<String>,
     /// Tells it apart from others of the same number (from version 2.3 on).
     pub condition_id: Option<String>,
-    /// `HIGH` or `LOW`.
+    /// `HIGH` or `LOW`, where a limit was passed.
     pub qualifier: Option<String>,
 }
 
@@ -69,13 +69,13 @@ pub struct Observation {
     pub sub_type: Option<String>,
     /// Kind of the component that it belongs to: `Rotary`.
     pub component: String,
-    /// Its number.
+    /// Its number among all of the agent.
     pub sequence: Option<u64>,
     /// When it was made, as the agent writes it.
     pub timestamp: String,
     /// The value, without the blanks around it.
     pub text: String,
-    /// Of a condition only.
+    /// What only a condition has.
     pub condition: Option<ConditionFields>,
 }
 
@@ -85,20 +85,20 @@ pub const UNAVAILABLE: &str = "UNAVAILABLE";
 /// What comes next in a document.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum StreamsEvent {
-    /// Its head.
+    /// The head of the document.
     Header(Header),
-    /// An observation.
+    /// An observation of a data item.
     Observation(Observation),
-    /// The agent refuses.
+    /// The agent refuses what it was asked for.
     Error {
         /// One of the words of the standard, for example `OUT_OF_RANGE`.
         code: String,
-        /// The sentence beside it.
+        /// The sentence that stands beside it.
         text: String,
     },
 }
 
-/// Reads a document.
+/// Reads a document of an agent, event by event.
 pub struct StreamsReader<R> {
     xml: XmlReader<R>,
     root: Option<String>,
@@ -111,7 +111,7 @@ pub struct StreamsReader<R> {
 }
 
 impl<R: BufRead> StreamsReader<R> {
-    /// A reader of this document.
+    /// A reader of this document, which is UTF-8.
     pub fn new(document: R) -> Self {
         let xml = XmlReader::new(document);
         Self { xml, root: None, component: String::new(), is_in_conditions: false, pending: None, text: String::new() }
@@ -156,7 +156,7 @@ impl<R: BufRead> StreamsReader<R> {
         }
     }
 
-    fn begin_element(&mut self, element: &Element) -> Option<Header> {
+    fn begin_element(&mut self, element: &XmlElement) -> Option<Header> {
         let root = self.root.get_or_insert_with(|| element.name.clone());
         if self.pending.is_some() {
             return None;
@@ -185,7 +185,7 @@ impl<R: BufRead> StreamsReader<R> {
         self.pending = Some((self.xml.depth(), event));
     }
 
-    fn begin_observation(&self, element: &Element) -> Option<Observation> {
+    fn begin_observation(&self, element: &XmlElement) -> Option<Observation> {
         let (item, timestamp) = (element.copy_attribute("dataItemId")?, element.copy_attribute("timestamp")?);
         let condition = self.is_in_conditions.then(|| ConditionFields {
             level: ConditionLevel::from_word(&element.name).unwrap_or(ConditionLevel::Unavailable),
@@ -227,7 +227,7 @@ impl<R: BufRead> StreamsReader<R> {
     }
 }
 
-fn parse_header(element: &Element) -> Header {
+fn parse_header(element: &XmlElement) -> Header {
     Header {
         instance_id: element.copy_attribute("instanceId"),
         first_sequence: element.parse_attribute("firstSequence"),

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 /// How the text of an observation becomes a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Form {
+pub(crate) enum ObservationForm {
     Number,
     /// A number, of an item that belongs to a composition of this kind only.
     OfComposition(&'static str),
@@ -25,7 +25,7 @@ pub(crate) enum Form {
     EmergencyStop,
 }
 
-impl Form {
+impl ObservationForm {
     /// Is the conversion of units needed?
     pub(crate) fn is_number(self) -> bool {
         matches!(self, Self::Number | Self::OfComposition(_) | Self::Coordinate(_))
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
     use adapter_core::reading::Value;
 
-    fn read(form: Form, channel: &str, text: &str) -> Result<Value, Absence> {
+    fn read(form: ObservationForm, channel: &str, text: &str) -> Result<Value, Absence> {
         let channel = ChannelId::from_name(channel).expect("in the table");
         form.build_reading(channel, Stamp::from_exact_time(0), text, Some(Conversion { scale: 60.0, offset: 0.0 }))
             .value
@@ -117,27 +117,27 @@ mod tests {
             ("PROGRAM_COMPLETED", Some("PROGRAM_COMPLETED")),
             ("BUSY", None),
         ] {
-            assert_eq!(word(Form::Execution, "execution", text).as_deref(), wanted, "{text}");
+            assert_eq!(word(ObservationForm::Execution, "execution", text).as_deref(), wanted, "{text}");
         }
-        assert_eq!(word(Form::Mode, "mode", "MANUAL_DATA_INPUT").as_deref(), Some("MANUAL_DATA_INPUT"));
-        assert_eq!(word(Form::Mode, "mode", "MEM"), None);
-        assert_eq!(word(Form::Tool, "tool", "07").as_deref(), Some("T07"));
-        assert_eq!(word(Form::Tool, "tool", "DRILL 8").as_deref(), Some("DRILL 8"));
-        assert_eq!(word(Form::Block, "block", "30").as_deref(), Some("N30"));
-        assert_eq!(word(Form::Program, "program", "//CNC_MEM/USER/O1234").as_deref(), Some("O1234"));
+        assert_eq!(word(ObservationForm::Mode, "mode", "MANUAL_DATA_INPUT").as_deref(), Some("MANUAL_DATA_INPUT"));
+        assert_eq!(word(ObservationForm::Mode, "mode", "MEM"), None);
+        assert_eq!(word(ObservationForm::Tool, "tool", "07").as_deref(), Some("T07"));
+        assert_eq!(word(ObservationForm::Tool, "tool", "DRILL 8").as_deref(), Some("DRILL 8"));
+        assert_eq!(word(ObservationForm::Block, "block", "30").as_deref(), Some("N30"));
+        assert_eq!(word(ObservationForm::Program, "program", "//CNC_MEM/USER/O1234").as_deref(), Some("O1234"));
     }
 
     #[test]
     fn numbers_are_converted_and_what_is_none_has_no_value() {
-        assert_eq!(read(Form::Number, "feed_mm_min", "20"), Ok(Value::Number(1200.0)));
-        assert_eq!(read(Form::Number, "feed_mm_min", "2e1"), Ok(Value::Number(1200.0)));
-        assert_eq!(read(Form::Coordinate(2), "z_axis_position_mm", "1 2 -3"), Ok(Value::Number(-180.0)));
+        assert_eq!(read(ObservationForm::Number, "feed_mm_min", "20"), Ok(Value::Number(1200.0)));
+        assert_eq!(read(ObservationForm::Number, "feed_mm_min", "2e1"), Ok(Value::Number(1200.0)));
+        assert_eq!(read(ObservationForm::Coordinate(2), "z_axis_position_mm", "1 2 -3"), Ok(Value::Number(-180.0)));
         for nothing in ["", "x", "NaN", "inf", "1 2"] {
-            assert_eq!(read(Form::Number, "feed_mm_min", nothing), Err(Absence::OutOfRange), "{nothing}");
+            assert_eq!(read(ObservationForm::Number, "feed_mm_min", nothing), Err(Absence::OutOfRange), "{nothing}");
         }
-        assert_eq!(read(Form::Coordinate(2), "z_axis_position_mm", "1 2"), Err(Absence::OutOfRange));
-        assert_eq!(read(Form::EmergencyStop, "emergency_stop", "TRIGGERED"), Ok(Value::Number(1.0)));
-        assert_eq!(read(Form::EmergencyStop, "emergency_stop", "ARMED"), Ok(Value::Number(0.0)));
-        assert_eq!(read(Form::EmergencyStop, "emergency_stop", "?"), Err(Absence::OutOfRange));
+        assert_eq!(read(ObservationForm::Coordinate(2), "z_axis_position_mm", "1 2"), Err(Absence::OutOfRange));
+        assert_eq!(read(ObservationForm::EmergencyStop, "emergency_stop", "TRIGGERED"), Ok(Value::Number(1.0)));
+        assert_eq!(read(ObservationForm::EmergencyStop, "emergency_stop", "ARMED"), Ok(Value::Number(0.0)));
+        assert_eq!(read(ObservationForm::EmergencyStop, "emergency_stop", "?"), Err(Absence::OutOfRange));
     }
 }

@@ -19,13 +19,13 @@ pub struct XmlError {
 
 /// An element with its attributes, without prefixes of namespaces.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Element {
-    /// Its name.
+pub struct XmlElement {
+    /// Its name, without the prefix of a namespace.
     pub name: String,
     attributes: Vec<(String, String)>,
 }
 
-impl Element {
+impl XmlElement {
     /// The value of an attribute.
     #[must_use]
     pub fn find_attribute(&self, name: &str) -> Option<&str> {
@@ -48,13 +48,13 @@ impl Element {
 /// What comes next in a document.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum XmlEvent {
-    /// An element begins.
-    Begin(Element),
+    /// An element begins, with its attributes.
+    Begin(XmlElement),
     /// A part of the text of the element that began last and has not ended.
     Text(String),
     /// The element that began last ends.
     End,
-    /// The document ends.
+    /// The document ends here.
     Eof,
 }
 
@@ -79,7 +79,7 @@ impl<R: BufRead> XmlReader<R> {
         self.depth
     }
 
-    /// The next event.
+    /// The next event of the document.
     ///
     /// # Errors
     /// The text is no XML.
@@ -114,13 +114,13 @@ impl<R: BufRead> XmlReader<R> {
     }
 }
 
-fn to_element(element: &BytesStart<'_>) -> Element {
+fn to_element(element: &BytesStart<'_>) -> XmlElement {
     let attributes = element.attributes().flatten().map(|attribute| {
         let value = attribute.normalized_value(XmlVersion::Implicit1_0);
         let value = value.map_or_else(|_| attribute.value.clone().into_owned(), std::borrow::Cow::into_owned);
         (attribute.key.local_name().as_ref().to_owned(), value)
     });
-    Element { name: element.local_name().as_ref().to_owned(), attributes: attributes.collect() }
+    XmlElement { name: element.local_name().as_ref().to_owned(), attributes: attributes.collect() }
 }
 
 fn resolve_reference(reference: &BytesRef<'_>) -> Option<char> {

@@ -188,7 +188,7 @@ fn a_control_that_is_gone_is_never_off_while_power_flows() {
 }
 
 #[test]
-#[ignore = "a campaign of ten minutes: 30 outages, what is told each second"]
+#[ignore = "7 minutes: what is told in each second of 30 outages"]
 fn thirty_outages_are_told_for_what_they_are() {
     let kinds = [Outage::Cable, Outage::Switch, Outage::Control, Outage::Meter, Outage::Cable, Outage::Control];
     let all: Vec<(Outage, bool)> = (0..30).map(|number| (kinds[number % kinds.len()], number % 5 != 4)).collect();

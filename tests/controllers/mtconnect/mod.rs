@@ -110,7 +110,7 @@ fn list_expected() -> Vec<(&'static str, Json, &'static str, Result<Json, Absenc
         ("so", json!("90"), "spindle_override_pct", Ok(json!(90.0))),
         ("f", json!(20.0), "feed_mm_min", Ok(json!(1200.0))),
         ("fp", json!(25.0), "feed_programmed_mm_min", Ok(json!(1500.0))),
-        ("fo", json!("80"), "feed_override_pct", Ok(json!(80.0))),
+        ("fov", json!("80"), "feed_override_pct", Ok(json!(80.0))),
         ("exec", json!("PROGRAM_STOPPED"), "execution", Ok(json!("STOPPED"))),
         ("mode", json!("SEMI_AUTOMATIC"), "mode", Ok(json!("SEMI_AUTOMATIC"))),
         ("pgm", json!("O1 & <2> \u{6570}"), "program", Ok(json!("O1 & <2> \u{6570}"))),
@@ -230,7 +230,7 @@ fn every_observation_comes_once_through_restarts_and_a_gap_is_told() {
 }
 
 #[test]
-#[ignore = "a campaign of ten seconds: 60,000 observations and 10 restarts"]
+#[ignore = "10 seconds: 60,000 observations of a foreign agent through 10 restarts come once each"]
 fn sixty_thousand_observations_come_once_through_ten_restarts() {
     assert!(agent_is_there(), "pip install mtconnect==0.3.3");
     read_all_once(60_000, 10);
