@@ -113,6 +113,9 @@ function drawEdge(lamp, facts, status, context) {
       : `${name}: ${word}`,
   );
   const left = wear?.parts_left ?? null;
+  const cutting = context.quantity("cutting_power_w");
+  // Which model a cut has is no question between the cuts: a standing spindle has neither operation nor material.
+  const between = !wear && status.state.word !== "cutting";
   const rows = wear
     ? [
         row(
@@ -133,8 +136,9 @@ function drawEdge(lamp, facts, status, context) {
         ),
         row(t("wear_form"), t(`form_${wear.form}`)),
       ]
-    : [row(t("no_wear_model"), "", `${box(status.no_wear_model ?? "")}. ${t("no_wear_model_words")}`)];
-  const cutting = context.quantity("cutting_power_w");
+    : between
+      ? [row(t("no_cut_now"), "", t("no_cut_now_words"))]
+      : [row(t("no_wear_model"), "", `${box(status.no_wear_model ?? "")}. ${t("no_wear_model_words")}`)];
   rows.unshift(
     row(
       t("short_cutting_power_w"),
@@ -146,13 +150,14 @@ function drawEdge(lamp, facts, status, context) {
         : t("wear_judged"),
     ),
   );
-  rows.push(
-    row(
-      t("remaining_parts"),
-      left === null ? "–" : parts(left[0]),
-      left === null ? t("remaining_unknown") : t("remaining_words", parts(left[1]), parts(left[2])),
-    ),
-  );
+  if (!between)
+    rows.push(
+      row(
+        t("remaining_parts"),
+        left === null ? "–" : parts(left[0]),
+        left === null ? t("remaining_unknown") : t("remaining_words", parts(left[1]), parts(left[2])),
+      ),
+    );
   const found = (key) => {
     const it = context.quantity(key);
     return it && !it.missing ? it : null;
