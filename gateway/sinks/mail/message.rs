@@ -70,8 +70,9 @@ fn format_body(outbox: &Outbox, AlarmMessage { item, alarm, historical }: AlarmM
     if historical {
         lines.extend([
             String::new(),
-            "This alarm has waited: there was no line to the mail server when it began.".to_owned(),
-            "此报警为延迟发送：报警发生时无法连接邮件服务器。".to_owned(),
+            "This alarm has waited: when it began there was no line to the mail server, or the hours were quiet."
+                .to_owned(),
+            "此报警为延迟发送：报警发生时无法连接邮件服务器，或处于免打扰时段。".to_owned(),
         ]);
     }
     lines.push(String::new());
