@@ -36,7 +36,7 @@ pub const SCHEMES: [(&str, &str); 13] = [
 /// What an address means. Each variant belongs to one kind of sink.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SinkTarget {
-    /// Alarms as mails.
+    /// Alarms as mails over SMTP.
     Mail(MailTarget),
     /// JSON documents on plain topics.
     Mqtt(MqttTarget),

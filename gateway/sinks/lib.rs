@@ -102,7 +102,7 @@ pub trait Sink: Send {
     }
 
     /// Until when items are held back, where that is so now. They wait in the outbox meanwhile.
-    fn find_hold(&self, _now_ns: TimeNs) -> Option<Hold> {
+    fn find_hold(&self, _now_ns: TimeNs) -> Option<DeliveryHold> {
         None
     }
 
@@ -129,7 +129,7 @@ pub trait Sink: Send {
 
 /// Items are held back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Hold {
+pub struct DeliveryHold {
     /// Until then, ns since 1970.
     pub until_ns: TimeNs,
     /// Some items go all the same.

@@ -43,7 +43,7 @@ const LICENCES: [&str; 11] = [
 ];
 
 /// Crates that are in the tree in two versions, each with the reason.
-const DUPLICATES: [(&str, &str); 9] = [
+const DUPLICATES: [(&str, &str); 10] = [
     ("base64", "the older one comes with the client of PostgreSQL, only in the feature `fleet`"),
     ("bit-vec", "the older one belongs to an optional part of rcgen that is not built"),
     ("fallible-iterator", "the older one comes with the client of PostgreSQL, only in the feature `fleet`"),
@@ -55,6 +55,7 @@ const DUPLICATES: [(&str, &str); 9] = [
     ("num-bigint", "the older one belongs to an optional part of rcgen that is not built"),
     ("rand", "0.9 for the seeded distributions; 0.10 only within proptest"),
     ("rand_core", "goes with rand"),
+    ("synstructure", "derive macros of two generations; nothing of it is in the program"),
     ("syn", "derive macros of two generations; nothing of it is in the program"),
 ];
 

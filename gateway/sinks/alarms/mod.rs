@@ -8,7 +8,7 @@ mod quiet;
 
 pub use quiet::QuietHours;
 
-use super::{Batch, Hold, Pending, Sink, SinkError};
+use super::{Batch, DeliveryHold, Pending, Sink, SinkError};
 use adapter_core::address::Keys;
 use adapter_core::clock::TimeNs;
 use gateway_history::{Alarm, Content, Item, Record};
@@ -49,7 +49,7 @@ impl AlarmSeverity {
 pub struct AlarmChoice {
     /// Lesser alarms are not sent.
     pub severity: AlarmSeverity,
-    /// When alarms wait.
+    /// The hours in which alarms wait.
     pub quiet: Option<QuietHours>,
     /// Alarms of this severity and graver ones do not wait.
     pub pass: Option<AlarmSeverity>,
@@ -81,9 +81,9 @@ impl AlarmChoice {
         self.find_alarm(item).is_some_and(|alarm| !passes(alarm))
     }
 
-    fn find_hold(&self, now_ns: TimeNs) -> Option<Hold> {
+    fn find_hold(&self, now_ns: TimeNs) -> Option<DeliveryHold> {
         let until_ns = self.quiet.as_ref()?.end_after(now_ns)?;
-        Some(Hold { until_ns, some_pass: self.pass.is_some() })
+        Some(DeliveryHold { until_ns, some_pass: self.pass.is_some() })
     }
 }
 
@@ -92,7 +92,7 @@ impl AlarmChoice {
 pub(super) struct AlarmMessage<'a> {
     pub(super) item: &'a Item,
     pub(super) alarm: &'a Alarm,
-    /// It has waited.
+    /// It has waited for the line, or for the end of the quiet hours.
     pub(super) historical: bool,
 }
 
@@ -127,7 +127,7 @@ pub(super) trait AlarmLine: Send {
 
 /// The number of an item over every run of the box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct ItemKey {
+struct AlarmKey {
     sequence: u64,
     epoch: u64,
 }
@@ -138,7 +138,7 @@ pub(super) struct AlarmSink<L> {
     line: L,
     /// Failures since the last alarm that arrived.
     failures: u32,
-    confirmed: BTreeSet<ItemKey>,
+    confirmed: BTreeSet<AlarmKey>,
 }
 
 impl<L: AlarmLine> AlarmSink<L> {
@@ -158,7 +158,7 @@ impl<L: AlarmLine> AlarmSink<L> {
 
     async fn send_alarms(&mut self, batch: Batch<'_>) -> Result<(), SinkError> {
         for item in batch.items {
-            let key = ItemKey { sequence: item.sequence, epoch: item.epoch };
+            let key = AlarmKey { sequence: item.sequence, epoch: item.epoch };
             let Some(alarm) = self.choice.find_alarm(item).filter(|_| !self.confirmed.contains(&key)) else { continue };
             let sent = self.line.send_alarm(AlarmMessage { item, alarm, historical: batch.historical }).await;
             self.failures = if sent.is_ok() { 0 } else { self.failures.saturating_add(1) };
@@ -203,7 +203,7 @@ impl<L: AlarmLine> Sink for AlarmSink<L> {
         self.line.probe_line()
     }
 
-    fn find_hold(&self, now_ns: TimeNs) -> Option<Hold> {
+    fn find_hold(&self, now_ns: TimeNs) -> Option<DeliveryHold> {
         self.choice.find_hold(now_ns)
     }
 

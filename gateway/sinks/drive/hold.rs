@@ -1,7 +1,7 @@
 //! While a sink holds items back: what may pass is delivered, the rest stays open in its position, over restarts too.
 
 use super::{Left, SinkTask, serve_within_deadline};
-use crate::{Hold, Sink};
+use crate::{DeliveryHold, Sink};
 use adapter_core::clock::TimeNs;
 use gateway_base::clock;
 use gateway_base::convert::clamp_to_unsigned;
@@ -19,7 +19,7 @@ impl SinkTask {
         &mut self,
         sink: &mut dyn Sink,
         head: &mut watch::Receiver<OutboxHead>,
-        hold: Hold,
+        hold: DeliveryHold,
     ) -> Result<(), Left> {
         let newest = head.borrow_and_update().next_sequence;
         match self.find_unwalked(newest)?.filter(|_| hold.some_pass) {
@@ -60,7 +60,7 @@ impl SinkTask {
         &mut self,
         sink: &mut dyn Sink,
         head: &mut watch::Receiver<OutboxHead>,
-        hold: Hold,
+        hold: DeliveryHold,
     ) -> Result<(), Left> {
         // Nobody who stops the box waits for a sink that sends nothing.
         self.outbox.set_linked(&self.name, false);

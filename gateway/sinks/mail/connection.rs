@@ -27,7 +27,7 @@ pub(super) struct SmtpConnection {
 }
 
 /// Recipients that the server did not take, each with what it said.
-pub(super) type Refused = Vec<String>;
+pub(super) type RefusedRecipients = Vec<String>;
 
 impl SmtpConnection {
     pub(super) async fn open(target: &MailTarget) -> Result<Self, SinkError> {
@@ -76,7 +76,12 @@ impl SmtpConnection {
     }
 
     /// Sends the mail to every recipient that the server takes. It has the mail when this returns.
-    pub(super) async fn send(&mut self, target: &MailTarget, sequence: u64, mail: &[u8]) -> Result<Refused, SinkError> {
+    pub(super) async fn send(
+        &mut self,
+        target: &MailTarget,
+        sequence: u64,
+        mail: &[u8],
+    ) -> Result<RefusedRecipients, SinkError> {
         let exchange = async {
             let refused = self.name_recipients(target).await?;
             self.line.command(Data).await.map_err(|error| explain(target, &error))?;
@@ -95,10 +100,10 @@ impl SmtpConnection {
         describe_refused(&refused).map_or(Ok(()), Err)
     }
 
-    async fn name_recipients(&mut self, target: &MailTarget) -> Result<Refused, SinkError> {
+    async fn name_recipients(&mut self, target: &MailTarget) -> Result<RefusedRecipients, SinkError> {
         let from: Address = target.from.email.clone();
         self.line.command(Mail::new(Some(from), Vec::new())).await.map_err(|error| explain(target, &error))?;
-        let mut refused = Refused::new();
+        let mut refused = RefusedRecipients::new();
         for to in &target.to {
             match self.line.command(Rcpt::new(to.email.clone(), Vec::new())).await {
                 Ok(_taken) => {}
@@ -112,7 +117,7 @@ impl SmtpConnection {
         }
     }
 
-    /// Says goodbye.
+    /// Ends the dialogue; a server that does not answer is left.
     pub(super) async fn quit(mut self) {
         let _gone = timeout(Duration::from_secs(1), self.line.quit()).await;
     }

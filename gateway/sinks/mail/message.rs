@@ -28,7 +28,7 @@ pub(super) fn build_mail(
     let builder = target.to.iter().fold(Message::builder().from(target.from.clone()), |built, to| built.to(to.clone()));
     let mail = builder
         .date(date.max(SystemTime::UNIX_EPOCH))
-        .subject(format_subject(&outbox.machine(), message))
+        .subject(format_subject(outbox.machine(), message))
         .message_id(Some(format!("<{id}@cnc-gateway>")))
         .raw_header(header("Auto-Submitted", "auto-generated"))
         .header(ContentType::TEXT_PLAIN)
@@ -70,8 +70,9 @@ fn format_body(outbox: &Outbox, AlarmMessage { item, alarm, historical }: AlarmM
     if historical {
         lines.extend([
             String::new(),
-            "This alarm has waited: there was no line to the mail server when it began.".to_owned(),
-            "此报警为延迟发送：报警发生时无法连接邮件服务器。".to_owned(),
+            "This alarm has waited: when it began there was no line to the mail server, or the hours were quiet."
+                .to_owned(),
+            "此报警为延迟发送：报警发生时无法连接邮件服务器，或处于免打扰时段。".to_owned(),
         ]);
     }
     lines.push(String::new());
@@ -98,7 +99,7 @@ mod tests {
             en: en.to_owned(),
             zh: zh.to_owned(),
         };
-        let content = Content::Record(Box::new(Record::Alarm(alarm.clone())).into());
+        let content = Content::Record(Box::new(Record::Alarm(alarm.clone())));
         let item = Item { sequence: 12, epoch: 0x1f, at_ns: alarm.at_ns, redated_ns: 0, content };
         let address = "smtp://relay?from=Box%20<box@works.example>&to=a@works.example,b@works.example";
         let address: crate::SinkAddress = address.parse().expect("an address");

@@ -12,7 +12,7 @@ use super::alarms::{AlarmChoice, AlarmLine, AlarmMessage, AlarmSink};
 use super::{Pending, SinkError};
 use adapter_core::address::{Endpoint, Keys, Login, parse_endpoint, tls_files};
 use adapter_core::tls::TlsFiles;
-use connection::{Refused, SmtpConnection, describe_refused};
+use connection::{RefusedRecipients, SmtpConnection, describe_refused};
 use gateway_base::clock;
 use gateway_history::Outbox;
 use lettre::message::Mailbox;
@@ -43,11 +43,11 @@ pub struct MailTarget {
     pub security: LineSecurity,
     /// The files of TLS, where the line is secured.
     pub tls: Option<TlsFiles>,
-    /// Who signs in.
+    /// User and password at the mail server, where it asks for them.
     pub login: Login,
-    /// Who sends.
+    /// The sender, whom the mail server lets send.
     pub from: Mailbox,
-    /// Who gets it; at least one.
+    /// The recipients of each mail, at least one.
     pub to: Vec<Mailbox>,
     /// Which alarms, and when.
     pub choice: AlarmChoice,
@@ -105,7 +105,7 @@ pub(super) fn open_mail(target: MailTarget, outbox: &Outbox) -> AlarmSink<MailLi
     let choice = target.choice.clone();
     AlarmSink::new(
         choice,
-        MailLine { target, outbox: outbox.clone(), connection: None, refused_recipients: Refused::new() },
+        MailLine { target, outbox: outbox.clone(), connection: None, refused_recipients: RefusedRecipients::new() },
     )
 }
 
@@ -114,7 +114,7 @@ pub(super) struct MailLine {
     outbox: Outbox,
     connection: Option<SmtpConnection>,
     /// Of the last mail.
-    refused_recipients: Refused,
+    refused_recipients: RefusedRecipients,
 }
 
 impl MailLine {
