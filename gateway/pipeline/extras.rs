@@ -141,7 +141,7 @@ mod tests {
     fn a_published_estimate_has_the_digits_of_the_history() {
         for series in list_series() {
             let decimals = series.decimals.unwrap_or_else(|| decimals_of_unit(&series.unit));
-            let number = 1234.567_891_234_567;
+            let number = 1_234.567_891_234_567;
             let kept = round_to_decimals(number, decimals);
             assert_eq!(round_as_stored(&series.name, &series.unit, number), kept, "{}", series.name);
         }

@@ -78,11 +78,11 @@ fn play_recording(story: &mut Story, course: Course, names: &[&str], browser: Op
         watching.push(begin(again.clone(), true));
         address = again;
     }
-    let browser = browser.map(|browser| {
+    let mut browser = browser;
+    if let Some(browser) = &mut browser {
         browser.open(&format!("http://{address}/now?lang=en"));
         browser.wait_until("document.getElementById('state')?.dataset.ms");
-        browser
-    });
+    }
     let shown = play_to_end(story, course, browser);
     wait_for("everything is delivered", Duration::from_secs(30), || {
         let sink = get(&address, "/api/v1/status").json()["sinks"][0].clone();
