@@ -70,6 +70,10 @@ pub struct SimulatedTarget {
     pub change_cut_pct: f64,
     /// Friction of the spindle after the change, percent of that before.
     pub change_friction_pct: f64,
+    /// An insert breaks off after so many hours; infinite when none does.
+    pub lost_insert_h: f64,
+    /// Number after the T of the tool whose insert breaks off.
+    pub lost_insert_tool: u8,
     /// Its day has begun so many seconds ago.
     pub begun_s: f64,
     /// How its days go.
@@ -106,6 +110,8 @@ pub fn parse_simulated(body: &str, keys: &mut Keys) -> Result<SimulatedTarget, N
         change_h: keys.take_number("change_h", f64::INFINITY, 0.0, 1e5),
         change_cut_pct: keys.take_number("change_cut_pct", 100.0, 10.0, 300.0),
         change_friction_pct: keys.take_number("change_friction_pct", 100.0, 10.0, 300.0),
+        lost_insert_h: keys.take_number("lost_insert_h", f64::INFINITY, 0.0, 1e5),
+        lost_insert_tool: keys.take_number("lost_insert_tool", 1, 1, 7),
         begun_s: keys.take_number("begun_s", 0.0, 0.0, 86_400.0),
         day: keys.take_choice(
             "day",

@@ -37,7 +37,7 @@ pub use meter::{MeterValues, SimulatedMeter};
 pub use moment::{Electric, Moment, Panel, TrueState, Truth};
 pub use offsets::SimulatedOffsets;
 pub use program::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep};
-pub use settings::{CutLevel, DaySettings, DeviceSettings, LaterChange, MeterSettings, SimulatedSettings};
+pub use settings::{CutLevel, DaySettings, DeviceSettings, LaterChange, LostInsert, MeterSettings, SimulatedSettings};
 
 use adapter_core::clock::TimeNs;
 use adapter_core::offset::Axis;
@@ -126,6 +126,21 @@ impl Simulated {
     /// and changes nothing.
     pub fn protect_offsets(&self, protected: bool) {
         self.locked().protect_offsets(protected);
+    }
+
+    /// From now on the machine is changed like this, whatever was set up: for a fault that comes and goes.
+    pub fn change_machine(&self, cut: f64, friction: f64) {
+        self.locked().change_now(cut, friction);
+    }
+
+    /// The edge in use of this tool, by the number after the T, loses an insert now.
+    pub fn break_insert(&self, tool: u8) {
+        self.locked().break_insert(tool);
+    }
+
+    /// The operator gives this tool a fresh edge now.
+    pub fn change_edge(&self, tool: u8) {
+        self.locked().change_edge(tool);
     }
 
     /// The operator turns the dial of the feed override at `at_ns`.

@@ -6,7 +6,7 @@ use super::ladder::{Ladder, LadderCounts, LadderInput};
 use super::moment::{Electric, Integrals, Moment, Panel, TrueState, Truth};
 use super::plant::{Plant, Spin};
 use super::program::{Control, Cut, ExperimentStep, Motion, Planner};
-use super::settings::{CutLevel, SimulatedSettings};
+use super::settings::{CutLevel, LaterChange, LostInsert, SimulatedSettings};
 use crate::address::SimulatedMachine;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use adapter_core::integer::{clamp_count, convert_bounded, length_to_i64};
@@ -42,6 +42,8 @@ pub(super) struct Machine {
     offsets_um: [f64; 3],
     offsets_protected: bool,
     cut: Cut,
+    /// The edge that has lost an insert, by its number.
+    broken_edge: Option<u16>,
     diameter_mm: f64,
     engaged: f64,
     load: Load,
@@ -73,6 +75,7 @@ impl Machine {
             offsets_um: [0.0; 3],
             offsets_protected: false,
             cut: Cut::default(),
+            broken_edge: None,
             diameter_mm: 0.0,
             engaged: 0.0,
             load: Load::default(),
@@ -109,6 +112,19 @@ impl Machine {
         if !self.offsets_protected {
             self.set_offset(axis, offset_um);
         }
+    }
+
+    pub(super) fn change_now(&mut self, cut: f64, friction: f64) {
+        self.settings.change = LaterChange { after_s: 0.0, cut, friction };
+    }
+
+    pub(super) fn break_insert(&mut self, tool: u8) {
+        self.settings.lost_insert = LostInsert { after_s: 0.0, tool };
+        self.broken_edge = None;
+    }
+
+    pub(super) fn change_edge(&mut self, tool: u8) {
+        self.control.fresh_edge(usize::from(tool));
     }
 
     pub(super) fn ladder_counts(&self) -> LadderCounts {
@@ -172,6 +188,9 @@ impl Machine {
         if since_s >= self.settings.change.after_s {
             self.plant.friction = self.settings.change.friction;
         }
+        if since_s >= self.settings.lost_insert.after_s && self.broken_edge.is_none() {
+            self.broken_edge = self.control.edges.get(usize::from(self.settings.lost_insert.tool)).copied();
+        }
         self.plant.advance_spindle(&self.control.demand, STEP_S);
         self.update_engagement(since_s);
         self.update_power(since_s);
@@ -221,7 +240,14 @@ impl Machine {
             wear_mm: self.control.wear_mm[self.control.tool_index()],
             hardness: self.control.hardness * (1.0 + 0.02 * self.plant.cut_unrest),
             no_load_w: self.plant.no_load_w,
+            insert_lost: self.has_lost_insert(),
         }
+    }
+
+    /// Has the edge in use lost an insert?
+    fn has_lost_insert(&self) -> bool {
+        self.control.tool == self.settings.lost_insert.tool
+            && self.broken_edge == Some(self.control.edges[self.control.tool_index()])
     }
 
     fn cutting_feed(&self) -> f64 {

@@ -78,6 +78,21 @@ pub struct LaterChange {
     pub friction: f64,
 }
 
+/// An insert breaks off: of a milling cutter one of its teeth is missing from then on, of a turning tool its only edge, until the edge
+/// is changed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LostInsert {
+    /// When, s after the start; infinite when never.
+    pub after_s: f64,
+    /// Number after the T of the tool.
+    pub tool: u8,
+}
+
+impl LostInsert {
+    /// A machine whose tools keep all of their inserts.
+    pub const NEVER: Self = Self { after_s: f64::INFINITY, tool: 1 };
+}
+
 /// How the working days of the machine go.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DaySettings {
@@ -155,6 +170,8 @@ pub struct SimulatedSettings {
     pub wear_mm: f64,
     /// What becomes of the machine later.
     pub change: LaterChange,
+    /// An insert that breaks off.
+    pub lost_insert: LostInsert,
     /// The builder's ladder between the gateway and the feed.
     pub ladder: LadderSettings,
     /// The controller's clock and line.
@@ -178,6 +195,7 @@ impl Default for SimulatedSettings {
             gauge_um: 0.0,
             wear_mm: FRESH_EDGE_MM,
             change: LaterChange { after_s: f64::INFINITY, cut: 1.0, friction: 1.0 },
+            lost_insert: LostInsert::NEVER,
             ladder: LadderSettings::default(),
             controller: DeviceSettings {
                 period: Duration::from_millis(100),
@@ -257,6 +275,7 @@ impl SimulatedSettings {
                 cut: target.change_cut_pct / 100.0,
                 friction: target.change_friction_pct / 100.0,
             },
+            lost_insert: LostInsert { after_s: 3600.0 * target.lost_insert_h, tool: target.lost_insert_tool },
             ladder: LadderSettings { rule: target.ladder, ..base.ladder },
             day: match target.day {
                 SimulatedDay::Work => base.day,

@@ -97,7 +97,7 @@ pub(super) const QUANTITIES: [QuantityRow; 11] = [
 pub(super) type FigureRow = (&'static str, &'static str, &'static str, &'static str, fn(&Estimates) -> Figure);
 
 /// Figures of the load and of the last part, which have no standard deviation of their own.
-pub(super) const FIGURES: [FigureRow; 15] = [
+pub(super) const FIGURES: [FigureRow; 17] = [
     (
         "feed_in_force_pct",
         "%",
@@ -159,6 +159,21 @@ pub(super) const FIGURES: [FigureRow; 15] = [
         "Share of the time in the cut at this place in which the coolant ran in the first parts",
         "示教工件在此处切削时冷却液开启的时间比例",
         |it| it.loads.learned_coolant_share,
+    ),
+    (
+        "learned_fall_share",
+        "1",
+        "By how much the tool in use has suddenly come to take less power than before, on the same work and beside the other tools; 0: it has \
+         not; no value before eight parts at learned places show what is usual",
+        "当前刀具功率突然下降的比例（0：未下降；学习后八件之前无值）",
+        |it| it.loads.learned_fall_share,
+    ),
+    (
+        "learned_visible_fall_share",
+        "1",
+        "The least sudden fall of the power of the tool in use that would be told, in the middle of a part",
+        "当前刀具可察觉的最小功率突降比例",
+        |it| it.loads.learned_visible_fall_share,
     ),
     (
         "learned_override_pct",

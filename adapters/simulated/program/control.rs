@@ -265,7 +265,8 @@ impl Control {
         self.fresh_edge(self.tool_index());
     }
 
-    fn fresh_edge(&mut self, index: usize) {
+    pub(in super::super) fn fresh_edge(&mut self, index: usize) {
+        let index = index.min(TOOLS - 1);
         self.edges[index] += 1;
         self.wear_mm[index] = FRESH_EDGE_MM;
     }

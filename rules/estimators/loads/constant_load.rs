@@ -57,8 +57,14 @@ impl ConstantLoad {
         let share = load / target;
         self.loaded = share > if self.loaded { AIR_BACK * limits.air_share } else { limits.air_share };
         let pct = if self.loaded {
-            let now_at =
-                FedShare { at_ns: now.at_ns, step_s, share, feed: feed / programmed, exponent: limits.exponent };
+            let now_at = FedShare {
+                at_ns: now.at_ns,
+                step_s,
+                share,
+                feed: feed / programmed,
+                actual_pct: 100.0 * feed / programmed,
+                exponent: limits.exponent,
+            };
             self.step_override(now, limits, now_at, (target, programmed), loads)
         } else {
             self.follower.let_go()

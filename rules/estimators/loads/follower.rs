@@ -6,6 +6,7 @@
 //! - *Down at once.* A load that is too great for the feed lowers it at this tick where the excess is clear, and after half a second
 //!   where it is small; later where a law waits until it is sure. While the feed itself changes, the power lags behind it; so the load is held against the greatest feed of
 //!   the last moments, and a feed that is already falling is not lowered twice.
+//!   Nothing is asked for where the axes already go slower: at the end of a block the feed falls before the load does.
 //! - *Up only from a steady load.* Where the tool enters or leaves the work the load is small, and nothing is to be concluded from
 //!   that. The feed rises only after the load has been the same for `steady_s`, in both halves of that time, and is not falling at
 //!   this moment.
@@ -63,8 +64,10 @@ pub(super) struct FedShare {
     pub(super) step_s: f64,
     /// Load over what it should be, as it is.
     pub(super) share: f64,
-    /// Feed over the programmed feed.
+    /// Feed over the one that `share` is reckoned at.
     pub(super) feed: f64,
+    /// Feed that the axes have, percent of the programmed feed.
+    pub(super) actual_pct: f64,
     /// Power of the feed with which the load grows.
     pub(super) exponent: f64,
 }
@@ -105,6 +108,8 @@ impl OverrideFollower {
         let target = |share: f64| wanted(share).clamp(range.min_pct, range.max_pct.max(range.min_pct));
         let pct = self
             .compute_lower_override(pct, least, range, &target)
+            // Axes that already go slower than what would be asked for (a block ends, a corner, the dial) are not slowed down.
+            .filter(|lower| *lower < now.actual_pct)
             .or_else(|| self.compute_raised_override(pct, range, &target))
             .unwrap_or(pct);
         self.pct = Some(pct);

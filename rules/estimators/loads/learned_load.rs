@@ -5,6 +5,7 @@ use super::follower::{FedShare, OverrideFollower};
 use super::limits::LearnedLimits;
 use super::load_inputs::{LoadChannels, LoadMoment};
 use super::place::Place;
+use super::tool_fall::{FallMoment, FallWatch};
 use crate::NoEstimate;
 use crate::signals::seconds_between;
 use adapter_core::clock::TimeNs;
@@ -20,6 +21,9 @@ const BLOCK_MAX: usize = 24;
 /// Standard deviations of the cutting power by which an excess must exceed its limit.
 const SURE_SD: f64 = 2.0;
 
+/// Feeds that differ by no more than this share are the same: the law of the feed is not exact enough for a fall of some percent.
+const SAME_FEED_SHARE: f64 = 0.03;
+
 /// Less than this share of the mean power of a place, beyond doubt, is none of its cut.
 const AIR_SHARE: f64 = 0.5;
 
@@ -34,6 +38,7 @@ pub(super) struct LearnedLoad {
     places: BTreeMap<String, Place>,
     /// Changes of place so far.
     changes: u64,
+    fall: FallWatch,
     #[serde(skip)]
     texts: PlaceTexts,
     #[serde(skip)]
@@ -56,6 +61,7 @@ impl LearnedLoad {
     pub(super) fn forget_program(&mut self, program: &str) {
         let beginning = format!("{program}/");
         self.places.retain(|key, _| !key.starts_with(&beginning));
+        self.fall.forget_program(program);
         self.follower.reset_cut();
     }
 
@@ -73,6 +79,7 @@ impl LearnedLoad {
         let power = now.cutting_power_w.filter(|_| now.cutting);
         let (Some((power_w, sd_w)), Some(key), Some(step_s)) = (power, &self.key, now.step_s) else {
             self.follower.reset_cut();
+            self.fall.leave_cut();
             return;
         };
         // Along the path where the feed is known, otherwise along the time, as far as the place goes.
@@ -127,6 +134,7 @@ impl LearnedLoad {
             self.follower.reset_cut();
             return;
         }
+        self.watch_fall(now, (power_w, step_s, feed), expected.power_w * by_feed, loads);
         loads.learned_multiple =
             Ok((power_w - SURE_SD * sd_w) / (place.peak_w.max(expected.power_w) * by_feed.max(1.0)));
         // The shares between which nothing is asked for; what the meter cannot tell is inside.
@@ -139,10 +147,32 @@ impl LearnedLoad {
             _ => 100.0,
         };
         let share = power_w / expected.power_w;
-        let at = FedShare { at_ns: now.at_ns, step_s, share, feed, exponent: limits.exponent };
+        let actual_pct = now.actual_pct().unwrap_or(f64::INFINITY);
+        let at = FedShare { at_ns: now.at_ns, step_s, share, feed, actual_pct, exponent: limits.exponent };
         let pct = self.follower.step_override(at, &limits.range, wanted);
         loads.learned_override_pct =
             if (pct - 100.0).abs() < 1e-9 { Err(NoEstimate::NothingToChange) } else { Ok(pct) };
+    }
+
+    /// Has the tool in use come to take less?
+    fn watch_fall(
+        &mut self,
+        now: &LoadMoment<'_>,
+        (power_w, step_s, feed): (f64, f64, f64),
+        expected_w: f64,
+        loads: &mut Loads,
+    ) {
+        let ([Some(program), Some(edge), ..], Some(place)) = (&self.texts.0, &self.key) else { return };
+        // Axes that slow down or run up again are at another feed than the one in force.
+        let off =
+            now.actual_pct().zip(now.in_force_pct).map_or(0.0, |(actual, in_force)| actual / in_force.max(1.0) - 1.0);
+        if (feed - 1.0).abs().max(off.abs()) <= SAME_FEED_SHARE {
+            let at_ns = now.at_ns;
+            self.fall.add_moment(&FallMoment { at_ns, step_s, program, edge, place, power_w, expected_w });
+        }
+        let figure = |share: Option<f64>| share.ok_or(NoEstimate::PlaceNotLearned);
+        loads.learned_fall_share = figure(self.fall.fallen_share(edge));
+        loads.learned_visible_fall_share = figure(self.fall.visible_share(edge));
     }
 
     /// What this part does at the place besides taking power: how far it feeds through the air, whether the coolant runs.
@@ -175,6 +205,7 @@ impl LearnedLoad {
         let part = sample.number(channels.part_count).ok();
         if part.is_some() && part != self.part {
             self.part = part;
+            self.fall.begin_part();
             self.begin_here(sample.at_ns);
         }
     }
@@ -209,6 +240,7 @@ impl LearnedLoad {
         if self.key != key_before {
             self.here_since_ns = sample.at_ns;
             self.air_before = 0.0;
+            self.fall.leave_cut();
             self.follower.reset_cut();
         }
         self.changes += 1;

@@ -86,6 +86,14 @@ pub(super) struct LoadMoment<'a> {
     pub(super) material: &'a str,
 }
 
+impl LoadMoment<'_> {
+    /// Feed that the axes have, percent of the programmed feed.
+    pub(super) fn actual_pct(&self) -> Option<f64> {
+        let programmed = self.programmed_mm_min.filter(|programmed| *programmed > 0.0)?;
+        Some(100.0 * self.feed_mm_min? / programmed)
+    }
+}
+
 impl LoadChannels {
     pub(super) fn read_moment<'a>(
         &self,

@@ -13,15 +13,18 @@
 //! | `constant_load` | constant load |
 //! | `place`, `learned_load` | the load of each place of a program, learned from the first parts |
 //! | `part_at_place` | what one part does at a place: path in the cut and through the air, coolant |
+//! | `tool_fall`, `fall_chain` | a tool that suddenly takes less than it did: an insert that is missing |
 
 mod constant_load;
 mod curves;
+mod fall_chain;
 mod follower;
 mod learned_load;
 mod limits;
 mod load_inputs;
 mod part_at_place;
 mod place;
+mod tool_fall;
 
 #[cfg(test)]
 mod tests;
@@ -66,6 +69,10 @@ pub struct Loads {
     pub learned_air_share: Figure,
     /// Share of the time in the cut at this place in which the coolant ran in the first parts.
     pub learned_coolant_share: Figure,
+    /// By how much the tool in use has suddenly come to take less power, as a share; 0 where it has not.
+    pub learned_fall_share: Figure,
+    /// The least such fall that would be seen of the tool in use, as a share.
+    pub learned_visible_fall_share: Figure,
     /// Feed override that brings the power back into the learned band; only in a cut, and only where it is outside.
     pub learned_override_pct: Figure,
 }
@@ -85,6 +92,8 @@ impl Loads {
             learned_multiple: Err(reason),
             learned_air_share: Err(reason),
             learned_coolant_share: Err(reason),
+            learned_fall_share: Err(reason),
+            learned_visible_fall_share: Err(reason),
             learned_override_pct: Err(reason),
         }
     }
@@ -101,6 +110,8 @@ impl Loads {
             "learned_multiple" => Some(&mut self.learned_multiple),
             "learned_air_share" => Some(&mut self.learned_air_share),
             "learned_coolant_share" => Some(&mut self.learned_coolant_share),
+            "learned_fall_share" => Some(&mut self.learned_fall_share),
+            "learned_visible_fall_share" => Some(&mut self.learned_visible_fall_share),
             "learned_override_pct" => Some(&mut self.learned_override_pct),
             _ => None,
         }

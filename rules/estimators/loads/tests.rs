@@ -23,6 +23,8 @@ struct Loop {
     powers: VecDeque<f64>,
     noise: f64,
     asked_pct: f64,
+    /// The axes come to rest at the end of a block, whatever the override.
+    stops: bool,
 }
 
 impl Loop {
@@ -40,6 +42,7 @@ impl Loop {
             powers,
             noise,
             asked_pct: 100.0,
+            stops: false,
         }
     }
 
@@ -49,21 +52,26 @@ impl Loop {
 
     /// One tick; `heaviness` is the cutting power at the programmed feed, W. Gives what is asked for, %.
     fn tick(&mut self, heaviness: f64, cutting: bool) -> f64 {
-        self.sample.at_ns += SECOND_NS / 10;
-        self.estimates.at_ns = self.sample.at_ns;
-        let state = if cutting { State::Cutting } else { State::Idle };
-        if state != self.estimates.state {
-            (self.estimates.state, self.estimates.since_ns) = (state, self.sample.at_ns);
-        }
         // The gate: 50 %/s down, 10 %/s up.
         self.feed += (self.asked_pct / 100.0 - self.feed).clamp(-0.5 * TICK_S, 0.1 * TICK_S);
         let noise: f64 = (0..6).map(|_| self.rng.random_range(-1.0..1.0)).sum::<f64>() / 1.414;
         let power = heaviness * self.feed.powf(0.75) + noise * self.noise;
         self.powers.pop_front();
         self.powers.push_back(power);
+        self.tick_as_it_is(cutting)
+    }
+
+    /// One tick at the feed and with the powers that are set.
+    fn tick_as_it_is(&mut self, cutting: bool) -> f64 {
+        self.sample.at_ns += SECOND_NS / 10;
+        self.estimates.at_ns = self.sample.at_ns;
+        let state = if cutting { State::Cutting } else { State::Idle };
+        if state != self.estimates.state {
+            (self.estimates.state, self.estimates.since_ns) = (state, self.sample.at_ns);
+        }
         let mean = self.powers.iter().sum::<f64>() / 5.0;
         self.estimates.cutting_power_w = Ok(Estimate { value: mean.max(0.0), sd: 10.0 });
-        let (feed, pct) = (PROGRAMMED * self.feed, 100.0 * self.feed);
+        let (feed, pct) = (PROGRAMMED * self.feed, if self.stops { 100.0 } else { 100.0 * self.feed });
         self.set("feed_mm_min", Value::Number(feed));
         self.set("feed_programmed_mm_min", Value::Number(PROGRAMMED));
         self.set("feed_override_pct", Value::Number(pct.round()));
@@ -272,4 +280,31 @@ fn at_the_least_feed_is_what_the_machine_does() {
     assert_eq!(in_force(&mut machine, 60.0, 120.0), 60.0);
     assert_eq!(in_force(&mut machine, 100.0, 80.0), 100.0, "a corner is no override");
     assert_eq!(in_force(&mut machine, 60.0, 200.0), 100.0, "an override that does not act");
+}
+
+/// Blocks end at any moment of a cut: the feed falls to nothing within a tick or more, the power follows later, and the drive shows a peak of
+/// up to twice the load. The axes are slower than anything that would be asked for, so nothing is asked for.
+#[test]
+fn the_end_of_a_block_asks_for_no_other_feed() {
+    for seed in 0..200 {
+        let mut machine = Loop::new(seed, 15.0, settings(1000.0, 100.0));
+        let mut rng = Pcg64Mcg::seed_from_u64(seed);
+        machine.tick(0.0, false);
+        let ticks = rng.random_range(2..60);
+        (0..ticks).for_each(|_| {
+            assert_eq!(machine.tick(850.0, true), 100.0, "seed {seed}: a cut below its target");
+        });
+        let peak = rng.random_range(1.0..2.0);
+        let stops_in = rng.random_range(1..4);
+        machine.stops = true;
+        for tick in 1..=6 {
+            // The feed is that between two readings of the control; the loop would raise it again.
+            machine.feed = (1.0 - f64::from(tick) / f64::from(stops_in)).max(0.0);
+            let feed = machine.feed;
+            let power_w = 850.0 * if feed < 0.6 { peak } else { 1.0 };
+            machine.powers.iter_mut().for_each(|power| *power = power_w);
+            let asked = machine.tick_as_it_is(true);
+            assert!(asked > 99.0, "seed {seed}, {tick} ticks after the end began, feed {feed}: {asked}");
+        }
+    }
 }

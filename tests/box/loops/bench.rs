@@ -3,7 +3,7 @@
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::merge::{Delay, Lockstep};
 use adapters::simulated::{ExperimentStep, Moment, Simulated, SimulatedSettings};
-use adapters::{Actuator, ChannelId, LadderRule, Pull, Sample, Slot, Value};
+use adapters::{Absence, Actuator, ChannelId, LadderRule, Pull, Sample, Slot, Value};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
 use gateway::gate::offset::{Moved, OffsetAccount, OffsetJournal, OffsetOrder};
 use gateway::gate::{AskOutcome, Gate, Reaction, ScriptRequest};
@@ -87,6 +87,63 @@ fn wander(sample: &mut Sample, share: f64, no_load_w: f64) {
     }
 }
 
+/// A fault between the machine and what arrives of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum LineFault {
+    /// The pump is not switched on.
+    CoolantOff,
+    ControlSilent,
+    MeterSilent,
+    /// The bearing is so much warmer, K.
+    BearingWarmer(f64),
+    /// The supply is lower by so much, V.
+    SupplyLower(f64),
+}
+
+/// What the meter delivers.
+const OF_METER: [&str; 6] = [
+    "spindle_power_w",
+    "total_power_w",
+    "spindle_current_a",
+    "supply_voltage_v",
+    "bearing_temperature_c",
+    "ambient_temperature_c",
+];
+
+impl LineFault {
+    pub(crate) fn apply(self, sample: &mut Sample) {
+        let mut add = |name: &str, by: f64| {
+            let id = ChannelId::from_name(name).expect("a channel");
+            if let Ok(value) = sample.number(id) {
+                let age_ns = sample.slot(id).age_ns;
+                sample.set_slot(id, Slot { value: Ok(Value::Number(value + by)), age_ns });
+            }
+        };
+        match self {
+            Self::BearingWarmer(kelvin) => add("bearing_temperature_c", kelvin),
+            Self::SupplyLower(volts) => add("supply_voltage_v", -volts),
+            Self::CoolantOff => {
+                let id = ChannelId::from_name("coolant_on").expect("a channel");
+                let slot = sample.slot(id).clone();
+                if slot.value.is_ok() {
+                    sample.set_slot(id, Slot { value: Ok(Value::Number(0.0)), ..slot });
+                }
+            }
+            Self::ControlSilent | Self::MeterSilent => {
+                let of_meter = |id: ChannelId| OF_METER.contains(&id.name());
+                let silent: Vec<ChannelId> = sample
+                    .provided_slots()
+                    .map(|(id, _)| id)
+                    .filter(|id| of_meter(*id) == (self == Self::MeterSilent))
+                    .collect();
+                for id in silent {
+                    sample.set_slot(id, Slot { value: Err(Absence::Timeout), age_ns: 0 });
+                }
+            }
+        }
+    }
+}
+
 /// A machine, and the gateway beside it.
 pub(crate) struct Bench {
     pub(crate) machine: Simulated,
@@ -99,6 +156,7 @@ pub(crate) struct Bench {
     pub(crate) work_material: Option<Arc<str>>,
     /// The mains wanders by so much, as a share: the supply voltage, and with its square three tenths of the no-load power.
     pub(crate) mains: f64,
+    pub(crate) line_fault: Option<LineFault>,
     /// Time between two ticks.
     pub(crate) period_ns: i64,
     /// Steps seen in force.
@@ -152,6 +210,7 @@ impl Bench {
             now_ns: 0,
             work_material: None,
             mains: 0.0,
+            line_fault: None,
             period_ns: TICK_NS,
             reactions: Vec::new(),
             moves: Vec::new(),
@@ -178,6 +237,9 @@ impl Bench {
                 self.mains,
                 self.pipeline.estimates().no_load_power_w.map_or(0.0, |power| power.value),
             );
+        }
+        if let Some(fault) = self.line_fault {
+            fault.apply(&mut self.sample);
         }
         let mut finished = Finished::default();
         self.pipeline.run_tick(&self.sample, &mut finished);

@@ -62,7 +62,7 @@ struct Counted {
 }
 
 /// The gate as it is delivered; armed or not.
-fn as_delivered(armed: bool) -> GateConfig {
+pub(super) fn as_delivered(armed: bool) -> GateConfig {
     let config = config::parse("test", BUILT_IN_TEXT, Path::new(""), []).expect("it is accepted");
     if !armed {
         return config.gate;
@@ -95,6 +95,9 @@ fn shift(setup: &Setup, seed: u64) -> Counted {
         let decision = bench.pipeline.scripts().decision().clone();
         for alarm in decision.alarms.iter().filter(|alarm| alarm.raised) {
             *counted.alarms.entry((alarm.level, alarm.name.to_string())).or_default() += 1;
+            if alarm.level != AlarmLevel::Info && !alarm.name.starts_with("tool_worn") {
+                counted.told.push(format!("{:.0} s: {}: {}", bench.now_s(), alarm.name, alarm.en));
+            }
         }
         counted.count_stops(&bench, &decision, &mut before);
         counted.count_feeds(&bench, &decision, &mut before);
@@ -199,7 +202,7 @@ fn score(setup: &Setup, shifts: &[Counted]) -> u32 {
         sum(|it| it.higher),
         alarms.join(", ")
     );
-    for shift in shifts.iter().filter(|shift| wrong(shift) > 0) {
+    for shift in shifts.iter().filter(|shift| !shift.told.is_empty()) {
         println!("  seed {}: {}", shift.seed, shift.told.iter().take(8).cloned().collect::<Vec<_>>().join("; "));
     }
     shifts.iter().map(wrong).sum()

@@ -3,6 +3,7 @@
 
 mod bench;
 mod constant_load;
+mod faults;
 mod healthy;
 mod recipe;
 mod steps;

@@ -23,16 +23,16 @@ use std::time::Duration;
 
 const SECOND_NS: i64 = 1_000_000_000;
 const STEP_S: i64 = 5;
-const SENSORS: [&str; 3] = ["bearing_temperature_c", "motor_temperature_c", "ambient_temperature_c"];
+pub(super) const SENSORS: [&str; 3] = ["bearing_temperature_c", "motor_temperature_c", "ambient_temperature_c"];
 /// The inserter lets edges leave at least so far apart.
 const SPACING_NS: u64 = 1_000;
 
-fn machine(seed: u64) -> Simulated {
+pub(super) fn machine(seed: u64) -> Simulated {
     Simulated::new("simulated://lathe", SimulatedSettings { seed, ..SimulatedSettings::default() }, 0)
 }
 
 /// Sensors with a tenth of a kelvin of noise, and the true error.
-fn look(machine: &Simulated, at_s: i64, dice: &mut Pcg64Mcg) -> ([f64; 3], f64) {
+pub(super) fn look(machine: &Simulated, at_s: i64, dice: &mut Pcg64Mcg) -> ([f64; 3], f64) {
     let moment = machine.moment(at_s * SECOND_NS);
     let mut noisy = |true_c: f64| true_c + 0.1 * dice.sample::<f64, _>(StandardNormal);
     let electric = moment.electric;
@@ -51,6 +51,13 @@ fn recorded(seed: u64, hours: i64) -> Recording {
     let gauge = rows.iter().map(|row| row.1 + 0.5 * dice.sample::<f64, _>(StandardNormal)).collect();
     recording.set_column("thermal_error_um", Cells::Numbers(Numbers::from_values(gauge)));
     recording
+}
+
+/// The law that such a day gives.
+pub(super) fn identify_law(seed: u64, hours: i64) -> ThermalLaw {
+    let collected = collect_rows(&recorded(seed, hours)).expect("usable");
+    let learned = learn_law(&collected.course, SelectionSettings::default(), None).expect("a law");
+    learned.best_candidate().fit.law.clone()
 }
 
 /// Root of the mean square and greatest magnitude.
@@ -171,9 +178,7 @@ fn through_the_gate(law: &ThermalLaw, hours: i64) {
 }
 
 fn day(hours: i64) {
-    let collected = collect_rows(&recorded(11, hours)).expect("usable");
-    let learned = learn_law(&collected.course, SelectionSettings::default(), None).expect("a law");
-    let law = learned.best_candidate().fit.law.clone();
+    let law = identify_law(11, hours);
     through_the_gate(&law, hours);
     println!("law: {} terms, late {:?} s, residual {:.2} um", law.terms.len(), law.tau_s, law.residual_sd_um);
     let settings = CompensationSettings { pulse_um: 1.0, limit_um: 150.0, ..CompensationSettings::default() };
