@@ -25,7 +25,7 @@ use super::estimate::NoEstimate;
 use super::estimate_words::NoLoadOrigin;
 use super::evidence::Evidence;
 use super::signals::{Feed, Pace, seconds_between};
-use super::situation::{Situation, Tick};
+use super::situation::{SeenBefore, Situation, Tick};
 use super::state::State;
 use super::window::Means;
 use adapter_core::clock::TimeNs;
@@ -144,7 +144,9 @@ impl Detector {
         self.notice_hidden_change(tick);
         let powered_before = self.powered;
         self.powered = tick.is_powered().unwrap_or(powered_before);
-        let situation = tick.determine_situation(self.crossing_zero(tick), powered_before);
+        let crossing_zero = self.crossing_zero(tick);
+        let before = SeenBefore { crossing_zero, powered: powered_before, turning: self.was_turning() };
+        let situation = tick.determine_situation(before);
         if let Situation::Missing(reason) = situation {
             return self.without_input(tick, reason);
         }
@@ -165,9 +167,13 @@ impl Detector {
             return false;
         }
         let since = *self.stands_since_ns.get_or_insert(now_ns);
-        let turned = !matches!(self.phase, Phase::Rest | Phase::Fresh);
+        let turned = self.was_turning();
         let fed = tick.inputs.feed.is_ok() && tick.classify_feed() == Feed::On;
         turned && fed && seconds_between(since, now_ns) < tick.settings.reversal_s
+    }
+
+    fn was_turning(&self) -> bool {
+        !matches!(self.phase, Phase::Rest | Phase::Fresh)
     }
 
     fn without_input(&mut self, tick: &Tick<'_>, reason: NoEstimate) -> Detected {

@@ -28,6 +28,17 @@ pub(super) enum Situation {
     Missing(NoEstimate),
 }
 
+/// What was seen up to this tick.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SeenBefore {
+    /// The spindle stands for a moment between two directions.
+    pub(super) crossing_zero: bool,
+    /// The machine had power a tick ago: a single pulse of the meter does not switch it on.
+    pub(super) powered: bool,
+    /// The spindle turned when its speed was read last.
+    pub(super) turning: bool,
+}
+
 impl Tick<'_> {
     pub(super) fn classify_feed(&self) -> Feed {
         self.signals.classify_feed(self.inputs, self.settings)
@@ -37,19 +48,18 @@ impl Tick<'_> {
         self.inputs.total.ok().map(|total| total.abs() >= self.settings.off_power_w)
     }
 
-    /// `powered_before` keeps a single pulse of the meter from switching the machine on.
-    pub(super) fn determine_situation(&self, crossing_zero: bool, powered_before: bool) -> Situation {
+    pub(super) fn determine_situation(&self, before: SeenBefore) -> Situation {
         let no_power = self.is_powered() == Some(false);
-        let meter_is_on = self.is_powered() == Some(true) && powered_before;
+        let meter_is_on = self.is_powered() == Some(true) && before.powered;
         match (self.inputs.speed, self.find_power_above_rest()) {
             // Neither a refused connection nor silence is off while power flows: that contradicts off and standby.
-            (Err(Absence::MachineOff), Some(power_w)) if self.standby_w.is_some() => {
+            (Err(Absence::MachineOff), Some(power_w)) if self.standby_w.is_some() || before.turning => {
                 Situation::Missing(NoEstimate::ControlSilent { power_w })
             }
             (Err(Absence::Timeout | Absence::Disconnected | Absence::Stale), Some(power_w)) => {
                 Situation::Missing(NoEstimate::ControlSilent { power_w })
             }
-            (speed, _) => self.judge_speed(speed, crossing_zero, no_power, meter_is_on),
+            (speed, _) => self.judge_speed(speed, before.crossing_zero, no_power, meter_is_on),
         }
     }
 

@@ -61,6 +61,23 @@ fn a_silent_controller_makes_it_unknown_and_a_machine_that_is_off_makes_it_off()
     assert_eq!(bed.hold(Now { total_w: None, ..silent }, 1.0).0, [State::Off]);
 }
 
+/// Connected in the middle of a shift: what the machine takes at rest is not known. A control that refuses while its spindle turns is no machine at rest.
+#[test]
+fn a_control_that_refuses_while_its_spindle_turns_is_silent_although_the_rest_is_not_known() {
+    let mut bed = Bed::new(Settings::default());
+    bed.reason = Absence::MachineOff;
+    bed.hold(cut(), 5.0);
+    let refused = Now { speed_rpm: None, feed_mm_min: None, power_w: None, total_w: Some(3300.0), ..cut() };
+    let (states, estimates) = bed.hold(refused, 5.0);
+    assert!(!states.iter().any(|state| matches!(state, State::Standby | State::Off)), "{states:?}");
+    assert_eq!(states.last(), Some(&State::Unknown), "{states:?}");
+    assert!(matches!(estimates.unknown_because, Some(NoEstimate::ControlSilent { power_w }) if power_w == 3300.0));
+    // A machine whose control has not been switched on yet is at rest.
+    let mut bed = Bed::new(Settings::default());
+    bed.reason = Absence::MachineOff;
+    assert_eq!(bed.hold(Now { total_w: Some(180.0), ..refused }, 3.0).0.last(), Some(&State::Standby));
+}
+
 /// Whatever way a control goes silent, with and without a meter, for any time: its spindle, which turns on, is not seen to start.
 #[test]
 fn a_control_that_answers_again_at_the_same_speed_has_not_started_its_spindle() {
