@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
 use std::time::{Duration, Instant};
 use testkit::nats_cluster::Cluster;
-use testkit::process::{Gateway, wait_for};
+use testkit::process::{Gateway, run, stderr, wait_for};
 
 const PATIENCE: Duration = Duration::from_secs(300);
 /// A clock of the computer that is wrong by less than this is no reason to date rows anew, ns.
@@ -59,13 +59,15 @@ pub(crate) fn with_leaps(scale: &Scale) -> Row {
 
 fn kill_often<R: Fn(&mut rand_pcg::Pcg64Mcg) -> String>(mut row: Row, count: usize, choose: R) -> Row {
     let (Some(plant), Some(nats)) = (Plant::start(), Cluster::start(1)) else { return Row::skipped(row.how) };
+    let made = run(&["fleet", "stream", &format!("{}/cnc", nats.address()), "--max-gb", "1"]);
+    row.must(made.status.success(), stderr(&made));
     let lines = format!(
         "[[source]]\naddress = \"simulated://lathe?seed=3\"\n[[sink]]\nname = \"mqtt\"\naddress = \"{}\"\n\
          [[sink]]\nname = \"nats\"\naddress = \"{}/cnc\"\n",
         plant.address(),
         nats.address()
     );
-    let Some(clocked) = Clocked::new(2.0, &lines) else { return Row::skipped(row.how) };
+    let Some(clocked) = Clocked::new(10.0, &lines) else { return Row::skipped(row.how) };
     let mut random = random();
     for life in 0..count {
         let is_wrong = life % 2 == 1;
@@ -75,7 +77,7 @@ fn kill_often<R: Fn(&mut rand_pcg::Pcg64Mcg) -> String>(mut row: Row, count: usi
         std::thread::sleep(Duration::from_millis(random.random_range(200..3000)));
         if is_wrong {
             clocked.set("+0s");
-            std::thread::sleep(Duration::from_millis(random.random_range(0..5000)));
+            std::thread::sleep(Duration::from_millis(random.random_range(0..14000)));
         }
         gateway.kill();
         row.n += 1;

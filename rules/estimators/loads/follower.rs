@@ -56,6 +56,9 @@ pub(super) struct OverrideFollower {
     pct: Option<f64>,
 }
 
+/// Feeds that are this near to each other are the same, percent of the programmed feed: half a step of a dial of whole percents.
+const FEED_STEP_PCT: f64 = 0.5;
+
 /// A share with the feed that it was measured at.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FedShare {
@@ -109,7 +112,7 @@ impl OverrideFollower {
         let pct = self
             .compute_lower_override(pct, least, range, &target)
             // Axes that already go slower than what would be asked for (a block ends, a corner, the dial) are not slowed down.
-            .filter(|lower| *lower < now.actual_pct)
+            .filter(|lower| *lower <= now.actual_pct + FEED_STEP_PCT)
             .or_else(|| self.compute_raised_override(pct, range, &target))
             .unwrap_or(pct);
         self.pct = Some(pct);
