@@ -92,6 +92,9 @@ pub(super) struct Detector {
     stands_since_ns: Option<TimeNs>,
     /// Did the meter see power at the tick before?
     powered: bool,
+    /// Did the spindle turn when its speed was read last?
+    #[serde(default)]
+    spindle_turned: bool,
     /// Running excess over no-load power during the cut, W.
     cut_level_w: f64,
 }
@@ -108,6 +111,7 @@ impl Detector {
             settled_speed: None,
             stands_since_ns: None,
             powered: false,
+            spindle_turned: false,
             cut_level_w: 0.0,
         }
     }
@@ -115,6 +119,7 @@ impl Detector {
     /// Nothing is known of the past any more; what is learned elsewhere stays.
     pub(super) fn forget_past(&mut self) {
         self.phase = Phase::Fresh;
+        self.spindle_turned = false;
         self.evidence.clear();
         self.missing_since_ns = None;
         self.since_ns = NOT_BEGUN;
@@ -144,8 +149,11 @@ impl Detector {
         self.notice_hidden_change(tick);
         let powered_before = self.powered;
         self.powered = tick.is_powered().unwrap_or(powered_before);
+        if let Ok(speed) = tick.inputs.speed {
+            self.spindle_turned = speed.abs() >= tick.settings.spindle_min_rpm;
+        }
         let crossing_zero = self.crossing_zero(tick);
-        let before = SeenBefore { crossing_zero, powered: powered_before, turning: self.was_turning() };
+        let before = SeenBefore { crossing_zero, powered: powered_before, turning: self.spindle_turned };
         let situation = tick.determine_situation(before);
         if let Situation::Missing(reason) = situation {
             return self.without_input(tick, reason);
@@ -167,13 +175,9 @@ impl Detector {
             return false;
         }
         let since = *self.stands_since_ns.get_or_insert(now_ns);
-        let turned = self.was_turning();
+        let turned = !matches!(self.phase, Phase::Rest | Phase::Fresh);
         let fed = tick.inputs.feed.is_ok() && tick.classify_feed() == Feed::On;
         turned && fed && seconds_between(since, now_ns) < tick.settings.reversal_s
-    }
-
-    fn was_turning(&self) -> bool {
-        !matches!(self.phase, Phase::Rest | Phase::Fresh)
     }
 
     fn without_input(&mut self, tick: &Tick<'_>, reason: NoEstimate) -> Detected {
