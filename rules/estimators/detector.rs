@@ -153,7 +153,7 @@ impl Detector {
             self.spindle_turned = speed.abs() >= tick.settings.spindle_min_rpm;
         }
         let crossing_zero = self.crossing_zero(tick);
-        let before = SeenBefore { crossing_zero, powered: powered_before, turning: self.spindle_turned };
+        let before = SeenBefore { crossing_zero, had_power: powered_before, turning: self.spindle_turned };
         let situation = tick.determine_situation(before);
         if let Situation::Missing(reason) = situation {
             return self.without_input(tick, reason);

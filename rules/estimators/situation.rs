@@ -34,7 +34,7 @@ pub(super) struct SeenBefore {
     /// The spindle stands for a moment between two directions.
     pub(super) crossing_zero: bool,
     /// The machine had power a tick ago: a single pulse of the meter does not switch it on.
-    pub(super) powered: bool,
+    pub(super) had_power: bool,
     /// The spindle turned when its speed was read last.
     pub(super) turning: bool,
 }
@@ -50,7 +50,7 @@ impl Tick<'_> {
 
     pub(super) fn determine_situation(&self, before: SeenBefore) -> Situation {
         let no_power = self.is_powered() == Some(false);
-        let meter_is_on = self.is_powered() == Some(true) && before.powered;
+        let meter_is_on = self.is_powered() == Some(true) && before.had_power;
         match (self.inputs.speed, self.find_power_above_rest()) {
             // Neither a refused connection nor silence is off while power flows: that contradicts off and standby.
             (Err(Absence::MachineOff), Some(power_w)) if self.standby_w.is_some() || before.turning => {
