@@ -7,12 +7,7 @@ export function mount(root, context) {
   const menu = make("nav", "chapters", null, { "aria-label": t("chapters") });
   const text = make("article", "card handbook", null, { tabindex: "-1" });
   const search = make("input", "", null, { type: "search", placeholder: t("search"), "aria-label": t("search") });
-  root.append(
-    make("div", "help", [
-      make("div", "card", [search, menu]),
-      text,
-    ]),
-  );
+  root.append(make("div", "help", [make("div", "card", [search, menu]), text]));
   const chapters = new Map();
   const read = async (name) => {
     if (!chapters.get(name)?.text) {

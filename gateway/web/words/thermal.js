@@ -19,7 +19,10 @@ export const THERMAL = {
   thermal_left: ["left", "残差"],
   last_eight_hours: ["last eight hours", "最近八小时"],
   temperatures: ["Temperatures", "温度"],
-  thermal_collecting: ["Collecting: {0} s so far; the figure begins after {1} s.", "正在采集：已有{0} s；{1} s后开始绘图。"],
+  thermal_collecting: [
+    "Collecting: {0} s so far; the figure begins after {1} s.",
+    "正在采集：已有{0} s；{1} s后开始绘图。",
+  ],
   no_thermal: [
     "No thermal error was measured or predicted in the last eight hours. It is measured where a source delivers thermal_error_um (a probe or a gauge), and predicted by a law: cnc-gateway identify thermal --model FILE, named by model under [thermal].",
     "最近八小时没有实测或预测的热误差。实测需数据源提供 thermal_error_um（测头或千分表）；预测需规律：cnc-gateway identify thermal --model FILE，并在 [thermal] 下以 model 指定。",

@@ -34,7 +34,10 @@ export const WEAR = {
   form_surface: ["response surface", "响应面"],
   form_physical: ["physical form", "物理模型"],
   no_cut_now: ["Nothing is being cut", "未在切削"],
-  no_cut_now_words: ["The limit of an edge belongs to a cut: it stands here while one is made.", "刀刃的阈值与切削对应，切削时在此显示。"],
+  no_cut_now_words: [
+    "The limit of an edge belongs to a cut: it stands here while one is made.",
+    "刀刃的阈值与切削对应，切削时在此显示。",
+  ],
   no_wear_model: ["No wear model for this cut", "此切削无磨损模型"],
   no_wear_model_words: [
     "Without a model the rules learn each tool's power in its first minute and watch how far it rises. A model: cnc-gateway identify tool-wear --store",
