@@ -46,8 +46,9 @@ pub(super) fn current(home: &Path) -> String {
 
 /// A box with the version of a package, 0.1.0. Its service runs only when it is started.
 pub(super) struct PackagedBox {
-    directory: tempfile::TempDir,
+    /// Ends before its directory goes.
     manager: Option<Manager>,
+    directory: tempfile::TempDir,
 }
 
 impl PackagedBox {
