@@ -34,7 +34,7 @@
 //! **Units.** An agent converts into the unit that the data item names (`units`). Where it names none, the numbers are native ones, with
 //! `nativeUnits` and `nativeScale`; where it names neither, those of the standard for its type.
 //!
-//! **Limits.** A document of [`multipart::DOCUMENT_BYTES_MAX`], [`model::ITEMS_MAX`] data items, [`agent::OBSERVATIONS_MAX`]
+//! **Limits.** A document of [`multipart::DOCUMENT_BYTES_MAX`], [`model::ITEMS_MAX`] data items, `agent::OBSERVATIONS_MAX`
 //! observations in a document, and [`deadline::REQUEST_MAX`] for all questions of a poll.
 
 pub mod address;
