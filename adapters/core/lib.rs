@@ -18,6 +18,7 @@ pub mod merge;
 pub mod offset;
 pub mod opened_device;
 pub mod own;
+pub mod percent;
 pub mod plausibility;
 pub mod reading;
 pub mod sample;

@@ -2,7 +2,7 @@
 
 use crate::address::MtConnectTarget;
 use crate::deadline::Deadline;
-use crate::http::{HttpError, Response, escape_percent, send_request};
+use crate::http::{HttpError, Response, escape_path_part, send_request};
 use crate::model::{Device, parse_devices};
 use crate::streams::{Header, Observation, StreamsEvent, StreamsReader};
 use adapter_core::address::Endpoint;
@@ -97,7 +97,7 @@ impl AgentLink {
     pub(crate) fn probe_device(&mut self) -> Result<Device, SourceError> {
         self.takes_name = true;
         let Some(wanted) = self.device.clone() else { return self.find_only_device() };
-        let path = format!("/{}/probe", escape_percent(&wanted));
+        let path = format!("/{}/probe", escape_path_part(&wanted));
         let described = match self.probe(&path) {
             Err(error) if !matches!(error, SourceError::Refused { .. }) => return Err(error),
             described => described.unwrap_or_default(),
@@ -184,7 +184,7 @@ impl AgentLink {
     /// An agent takes the name or the uuid of a device. One that does not answers for all of its devices, whose items have other identifiers.
     fn name_in_path(&self, device: &Device) -> String {
         let name = if device.name.is_empty() { &device.uuid } else { &device.name };
-        if self.takes_name { format!("/{}", escape_percent(name)) } else { String::new() }
+        if self.takes_name { format!("/{}", escape_path_part(name)) } else { String::new() }
     }
 
     fn ask(&self, path: &str) -> Result<Vec<u8>, SourceError> {

@@ -4,6 +4,7 @@ use crate::body::BodyDecoder;
 use crate::deadline::Deadline;
 use crate::multipart::DOCUMENT_BYTES_MAX;
 use adapter_core::address::Endpoint;
+use adapter_core::percent::escape_percent;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use thiserror::Error;
@@ -12,7 +13,7 @@ use thiserror::Error;
 const HEAD_BYTES_MAX: usize = 32 << 10;
 const HEADERS_MAX: usize = 64;
 /// Bytes that are read at once.
-const READ_BYTES: usize = 64 << 10;
+pub(crate) const READ_BYTES: usize = 64 << 10;
 
 /// Why there is no answer.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -156,10 +157,9 @@ impl Response {
     }
 }
 
-/// A text as a part of a path or a value of a query: everything but letters, digits and `-._~` as `%` and two digits (RFC 3986).
-pub(crate) fn escape_percent(text: &str) -> String {
-    let plain = |byte: &u8| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'.' | b'_' | b'~');
-    text.bytes().map(|byte| if plain(&byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") }).collect()
+/// A text as a part of a path or a value of a query: everything but what RFC 3986 leaves as it is (section 2.3).
+pub(crate) fn escape_path_part(text: &str) -> String {
+    escape_percent(text, b"-._~")
 }
 
 #[cfg(test)]
@@ -168,8 +168,8 @@ mod tests {
 
     #[test]
     fn a_name_of_a_device_is_escaped() {
-        assert_eq!(escape_percent("M 1/车"), "M%201%2F%E8%BD%A6");
-        assert_eq!(escape_percent("Mazak-01_a.b~"), "Mazak-01_a.b~");
+        assert_eq!(escape_path_part("M 1/车"), "M%201%2F%E8%BD%A6");
+        assert_eq!(escape_path_part("Mazak-01_a.b~"), "Mazak-01_a.b~");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The part of an address after the question mark, taken key by key so that what is left over can be refused.
 
 use crate::channel::find_nearest_name;
+use crate::percent;
 use crate::text::TextEncoding;
 use std::fmt::Display;
 use std::str::FromStr;
@@ -31,7 +32,7 @@ impl Keys {
         if self.given.iter().any(|(known, _)| known == key) {
             return self.add_problem(format!("{key} is given twice"));
         }
-        self.given.push((key.to_owned(), unescape_percent(value)));
+        self.given.push((key.to_owned(), percent::unescape_percent(value)));
     }
 
     /// Adds what is wrong with a key, in words; the address is refused with all of them.
@@ -113,39 +114,9 @@ pub fn parse_encoding(keys: &mut Keys) -> TextEncoding {
     })
 }
 
-/// `%20` and the like as the bytes they stand for; anything else as it is.
-fn unescape_percent(text: &str) -> String {
-    let mut bytes = Vec::with_capacity(text.len());
-    let mut rest = text.as_bytes();
-    while let Some((&first, after)) = rest.split_first() {
-        match after.first_chunk::<2>().filter(|_| first == b'%').and_then(|pair| parse_hex_pair(*pair)) {
-            Some(byte) => {
-                bytes.push(byte);
-                rest = &after[2..];
-            }
-            None => {
-                bytes.push(first);
-                rest = after;
-            }
-        }
-    }
-    String::from_utf8(bytes).unwrap_or_else(|_| text.to_owned())
-}
-
-fn parse_hex_pair(pair: [u8; 2]) -> Option<u8> {
-    let digit = |byte: u8| char::from(byte).to_digit(16).and_then(|digit| u8::try_from(digit).ok());
-    Some(digit(pair[0])? * 16 + digit(pair[1])?)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn escapes_are_undone_and_stray_percent_signs_kept() {
-        assert_eq!(unescape_percent("a%20b%2"), "a b%2");
-        assert_eq!(unescape_percent("100%"), "100%");
-    }
 
     #[test]
     fn a_key_given_twice_is_a_problem() {

@@ -14,6 +14,7 @@ use super::super::query::Query;
 use super::super::reader::Reader;
 use super::parquet;
 use adapter_core::clock::TimeNs;
+use adapter_core::percent::escape_percent;
 use std::fs::{self, File};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
@@ -35,8 +36,7 @@ pub fn day_of(at_ns: TimeNs) -> TimeNs {
 
 /// Letters, digits, `-`, `_` and `.` stay; every other byte is escaped with `%`, as Hive does.
 fn escape_name(name: &str) -> String {
-    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
-    name.bytes().map(|byte| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") }).collect()
+    escape_percent(name, b"-_.")
 }
 
 /// The file of a machine, box and day for one kind of rows.
