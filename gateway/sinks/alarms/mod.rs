@@ -125,6 +125,18 @@ pub(super) trait AlarmLine: Send {
     }
 }
 
+/// A connection that is kept between alarms.
+pub(super) trait KeptConnection: Send {
+    /// Does it still stand? Its receiver may have closed it meanwhile.
+    fn is_ready(&mut self) -> impl Future<Output = bool> + Send;
+}
+
+/// The connection of the last alarm, where it still stands.
+pub(super) async fn reuse_connection<C: KeptConnection>(kept: Option<C>) -> Option<C> {
+    let mut kept = kept?;
+    kept.is_ready().await.then_some(kept)
+}
+
 /// The number of an item over every run of the box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct AlarmKey {

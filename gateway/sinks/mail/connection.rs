@@ -2,6 +2,7 @@
 
 use super::{LineSecurity, MailTarget};
 use crate::SinkError;
+use crate::alarms::KeptConnection;
 use crate::webhook::format_place;
 use adapter_core::tls::{TlsError, TlsFiles};
 use lettre::Address;
@@ -28,6 +29,13 @@ pub(super) struct SmtpConnection {
 
 /// Recipients that the server did not take, each with what it said.
 pub(super) type RefusedRecipients = Vec<String>;
+
+impl KeptConnection for SmtpConnection {
+    /// A server closes a connection that is idle for minutes.
+    async fn is_ready(&mut self) -> bool {
+        self.last_use.elapsed() < FRESH || matches!(timeout(DEADLINE, self.line.test_connected()).await, Ok(true))
+    }
+}
 
 impl SmtpConnection {
     pub(super) async fn open(target: &MailTarget) -> Result<Self, SinkError> {
@@ -63,11 +71,6 @@ impl SmtpConnection {
             let next = "compare user= and password_file= with the mail server's, and what it lets this user do";
             SinkError::failed_line(format!("{} does not let the box in: {error}", place(target)), next)
         })
-    }
-
-    /// Does it still stand? A server closes a connection that is idle for minutes.
-    pub(super) async fn is_ready(&mut self) -> bool {
-        self.last_use.elapsed() < FRESH || matches!(timeout(DEADLINE, self.line.test_connected()).await, Ok(true))
     }
 
     /// When it was used last.

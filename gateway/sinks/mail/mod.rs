@@ -8,7 +8,7 @@ mod connection;
 mod message;
 
 use super::address::TargetError;
-use super::alarms::{AlarmChoice, AlarmLine, AlarmMessage, AlarmSink};
+use super::alarms::{AlarmChoice, AlarmLine, AlarmMessage, AlarmSink, reuse_connection};
 use super::{Pending, SinkError};
 use adapter_core::address::{Endpoint, Keys, Login, parse_endpoint, tls_files};
 use adapter_core::tls::TlsFiles;
@@ -132,12 +132,7 @@ impl MailLine {
             what: format!("no mail can be made of it: {error}"),
             next: "read the alarm on the page".to_owned(),
         })?;
-        let mut idle = self.connection.take();
-        let stands = match &mut idle {
-            Some(connection) => connection.is_ready().await,
-            None => false,
-        };
-        let mut connection = match idle.filter(|_| stands) {
+        let mut connection = match reuse_connection(self.connection.take()).await {
             Some(connection) => connection,
             None => SmtpConnection::open(&self.target).await?,
         };

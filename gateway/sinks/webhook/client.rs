@@ -1,6 +1,7 @@
 //! One HTTP/1.1 connection to the receiver.
 
 use super::SinkError;
+use crate::alarms::KeptConnection;
 use adapter_core::address::Endpoint;
 use adapter_core::tls::TlsFiles;
 use hmac::{Hmac, KeyInit, Mac};
@@ -65,6 +66,13 @@ fn sign_body(secret: &[u8], body: &[u8]) -> String {
 /// A connection that stands.
 pub(super) struct HttpConnection(SendRequest<Full<Bytes>>);
 
+impl KeptConnection for HttpConnection {
+    /// False where the receiver has closed it.
+    async fn is_ready(&mut self) -> bool {
+        self.0.ready().await.is_ok()
+    }
+}
+
 impl HttpConnection {
     /// Connects, with TLS where there are files of it.
     pub(super) async fn open_connection(at: &Endpoint, tls: Option<&TlsFiles>) -> Result<Self, SinkError> {
@@ -93,11 +101,6 @@ impl HttpConnection {
         // It ends with the sender; what it ends with is told by the request that was on its way.
         tokio::spawn(async move { drop(connection.await) });
         Ok(Self(sender))
-    }
-
-    /// Can it carry a request? False where the receiver has closed it.
-    pub(super) async fn is_ready(&mut self) -> bool {
-        self.0.ready().await.is_ok()
     }
 
     /// Sends the message and gives the status of the answer.

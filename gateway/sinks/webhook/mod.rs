@@ -8,7 +8,7 @@
 mod client;
 
 use super::address::TargetError;
-use super::alarms::{AlarmChoice, AlarmLine, AlarmMessage, AlarmSink};
+use super::alarms::{AlarmChoice, AlarmLine, AlarmMessage, AlarmSink, reuse_connection};
 use super::mqtt::build_document;
 use super::nats::format_message_id;
 use super::{Pending, SinkError};
@@ -104,12 +104,7 @@ impl WebhookLine {
         let body = build_document(&self.outbox, item, historical).to_string().into_bytes();
         let key = format_message_id(&self.outbox.box_id(), item);
         let post = Post::new(&self.target.path, &self.target.at, body, &key, &self.secret);
-        let mut idle = self.connection.take();
-        let stands = match &mut idle {
-            Some(connection) => connection.is_ready().await,
-            None => false,
-        };
-        let mut connection = match idle.filter(|_| stands) {
+        let mut connection = match reuse_connection(self.connection.take()).await {
             Some(connection) => connection,
             None => HttpConnection::open_connection(&self.target.at, self.target.tls.as_ref()).await?,
         };
