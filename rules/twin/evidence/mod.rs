@@ -69,6 +69,7 @@ use posterior::{NoiseSetting, rank_explanations};
 use recording::Recording;
 use search::{SetEvidence, SetSearch, compute_ln_priors};
 use second_stage::SecondStage;
+use std::cell::OnceCell;
 use unrecorded_states::Residuals;
 use validation::Judge;
 
@@ -117,6 +118,7 @@ pub fn diagnose_recording(recording: &Recording, model: &Model, seed: u64) -> Re
         noise,
         recorded: &outliers.recorded,
         ordinary: outliers.ordinary,
+        baseline_square: OnceCell::new(),
     };
     Ok(report.into_diagnosis())
 }

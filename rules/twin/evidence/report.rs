@@ -32,6 +32,7 @@ use adapter_core::bilingual::Bilingual;
 use numerics::statistics::{count_to_f64, rms};
 use physics::{Entry, find_effect};
 use recording::Recording;
+use std::cell::OnceCell;
 
 /// Share of the rows in which a law acts that must lie in its place: the others are edges of it.
 const ACTS_IN_PLACE: f64 = 0.98;
@@ -49,6 +50,8 @@ pub(super) struct EvidenceReport<'a, 'm> {
     pub(super) recorded: &'a [f64],
     /// Deviation of the ordinary noise.
     pub(super) ordinary: f64,
+    /// What the baseline leaves of rows left out, once it was asked for.
+    pub(super) baseline_square: OnceCell<f64>,
 }
 
 impl EvidenceReport<'_, '_> {

@@ -1,6 +1,7 @@
 //! What a recording tells of the parameters of a law: those that it does not tell are taken as known, and a name whose size it
 //! does not tell is not sure.
 
+use super::law_starts::StartSearch;
 use super::report::EvidenceReport;
 use crate::departure::is_of_departure;
 use crate::diagnosis::{Missing, ParameterEstimate};
@@ -62,7 +63,7 @@ impl EvidenceReport<'_, '_> {
     }
 
     /// A fit in which a law with a size that the recording does not tell has another form, where one is told and predicts as well.
-    pub(super) fn replace_open_forms(&mut self, near: &[(String, Part)], fit: Fit) -> Fit {
+    pub(super) fn replace_open_forms(&mut self, near: &[(String, Part)], search: &StartSearch, fit: Fit) -> Fit {
         let mut best = fit;
         let most = self.compute_allowed_square(&best);
         for (number, (name, _)) in near.iter().enumerate() {
@@ -72,9 +73,8 @@ impl EvidenceReport<'_, '_> {
             if self.is_law_told(&best, place) {
                 continue;
             }
-            let search = self.prepare_starts();
             let mut told: Option<(f64, Fit)> = None;
-            for start in search.list_start_sets(&[self.list_law_starts(name, &search)]) {
+            for start in search.list_start_sets(&[self.list_law_starts(name, search)]) {
                 let mut parts = best.parts.clone();
                 parts.splice(place..=place, start);
                 let Some(other) = self.refit_parts(&parts) else { continue };
@@ -99,7 +99,8 @@ impl EvidenceReport<'_, '_> {
     /// Squares of rows left out up to which a simpler fit stands for this one.
     fn compute_allowed_square(&self, fit: &Fit) -> f64 {
         let least = self.prepare_left_out(fit).compute_square();
-        let gain = self.prepare_left_out(self.baseline).compute_square() - least;
+        let baseline = self.baseline_square.get_or_init(|| self.prepare_left_out(self.baseline).compute_square());
+        let gain = baseline - least;
         least + (NO_LOSS * least).max(GAIN_FOR_TOLD * gain)
     }
 

@@ -2,6 +2,7 @@
 //! leaves least of rows left out, and with the departure of the machine from it where that carries over.
 
 use super::latent_law::is_latent;
+use super::law_starts::StartSearch;
 use super::report::EvidenceReport;
 use crate::channel::{SIMULATED_CUT, TIME, read_channel_values};
 use crate::departure::{DEPARTURE_USUAL, Departure};
@@ -25,24 +26,24 @@ const DEPARTURE_GAIN: f64 = 2e-3;
 impl EvidenceReport<'_, '_> {
     /// The best fit of these laws beside the baseline; each is given as it comes nearest to the curve that was found.
     pub(super) fn fit_named_laws(&mut self, near: &[(String, Part)]) -> Option<Fit> {
-        let first = self.fit_from_starts(near)?;
+        let search = self.prepare_starts();
+        let first = self.fit_from_starts(near, &search)?;
         let best = self.mend_by_subsets(near, first);
         let wider = self.add_departures(best);
         let settled = self.settle_parameters(wider);
-        Some(self.replace_open_forms(near, settled))
+        Some(self.replace_open_forms(near, &search, settled))
     }
 
     /// Of the fits from the nearest laws and from the output the one that leaves least of rows left out.
-    fn fit_from_starts(&mut self, near: &[(String, Part)]) -> Option<Fit> {
-        let search = self.prepare_starts();
+    fn fit_from_starts(&mut self, near: &[(String, Part)], search: &StartSearch) -> Option<Fit> {
         let mut all = Vec::new();
         for (name, part) in near {
             let columns = || part.compute_columns(&self.case.scene).unwrap_or_default();
             let latent = || columns().into_iter().map(|(_, column)| column).collect::<Vec<_>>();
             let own = if is_latent(part) {
-                vec![self.build_start(part.clone(), &latent(), &search)]
+                vec![self.build_start(part.clone(), &latent(), search)]
             } else {
-                self.list_law_starts(name, &search)
+                self.list_law_starts(name, search)
             };
             all.push(own);
         }
