@@ -1,7 +1,7 @@
 //! How observations come: as the parts of an answer that does not end, or as the answers to one question at every poll.
 
 use crate::body::BodyDecoder;
-use crate::http::{HttpError, Response, to_error};
+use crate::http::{HttpError, READ_BYTES, Response, to_error};
 use crate::multipart::{MultipartSplitter, find_boundary};
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read};
@@ -21,7 +21,7 @@ const DISTANCES: usize = 9;
 
 /// The way in which a device tells its observations.
 pub(crate) enum ObservationFeed {
-    Stream(LiveStream),
+    Stream(Box<LiveStream>),
     /// The agent answers a question for parts with one document: it is asked at every poll.
     Questions,
 }
@@ -40,6 +40,8 @@ pub(crate) struct LiveStream {
     has_ended: bool,
     /// Times from part to part, of the last ones.
     distances: VecDeque<Duration>,
+    /// What is read at once: a look comes every few milliseconds.
+    bytes: Vec<u8>,
 }
 
 impl LiveStream {
@@ -60,6 +62,7 @@ impl LiveStream {
             parts: 0,
             has_ended: false,
             distances: VecDeque::new(),
+            bytes: vec![0; READ_BYTES],
         }))
     }
 
@@ -119,14 +122,13 @@ impl LiveStream {
     }
 
     fn read_available(&mut self) -> Result<(), HttpError> {
-        let mut bytes = vec![0; 64 << 10];
         let mut taken = 0;
         while !self.has_ended && taken < BYTES_MAX {
-            match self.stream.read(&mut bytes) {
+            match self.stream.read(&mut self.bytes) {
                 Ok(0) => self.has_ended = true,
                 Ok(count) => {
                     taken += count;
-                    let framed = self.decoder.decode_into(&bytes[..count], self.splitter.tail());
+                    let framed = self.decoder.decode_into(&self.bytes[..count], self.splitter.tail());
                     framed.map_err(|error| HttpError::Nonsense(error.to_string()))?;
                 }
                 Err(error) if error.kind() == ErrorKind::WouldBlock => break,

@@ -172,7 +172,7 @@ impl MtConnectSource {
         };
         let to_error = |error| self.link.to_line_error("sample", error);
         match LiveStream::from_response(response, self.link.silence).map_err(to_error)? {
-            Ok(stream) => Ok(ObservationFeed::Stream(stream)),
+            Ok(stream) => Ok(ObservationFeed::Stream(Box::new(stream))),
             // An answer in one part says whether the question was understood; its observations are asked for again.
             Err(response) => {
                 let body = response.read_body(self.link.deadline()).map_err(to_error)?;
