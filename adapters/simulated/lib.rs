@@ -33,7 +33,7 @@ mod tests;
 pub use actuator::SimulatedOverride;
 pub use controller::SimulatedController;
 pub use ladder::{LadderCounts, LadderSettings};
-pub use meter::{MeterValues, SimulatedMeter};
+pub use meter::{METER_CHANNELS, MeterValues, SimulatedMeter};
 pub use moment::{Electric, Moment, Panel, TrueState, Truth};
 pub use offsets::SimulatedOffsets;
 pub use program::{EXPERIMENT_PROGRAM, ExperimentCut, ExperimentStep};

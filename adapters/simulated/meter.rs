@@ -13,8 +13,8 @@ use adapter_core::reading::{Reading, Stamp};
 use std::f64::consts::TAU;
 use std::time::Duration;
 
-/// The channels, in the order of [`MeterValues::collect_numbers`].
-const CHANNELS: [&str; 6] = [
+/// The channels of the meter, in the order of [`MeterValues::collect_numbers`].
+pub const METER_CHANNELS: [&str; 6] = [
     "spindle_power_w",
     "total_power_w",
     "spindle_current_a",
@@ -72,7 +72,7 @@ impl SimulatedMeter {
         // Another seed than the controller's, so that their lines are not slow together.
         let seed = settings.seed.wrapping_add(0x5EED);
         let device = PolledDevice::new(settings.meter.device, seed, machine.origin_ns());
-        let channels = CHANNELS.iter().filter_map(|name| ChannelId::from_name(name)).collect();
+        let channels = METER_CHANNELS.iter().filter_map(|name| ChannelId::from_name(name)).collect();
         Self { name, machine, device, settings: settings.meter, channels, seed }
     }
 

@@ -97,9 +97,7 @@ impl Clocked {
 
 /// The address that the `count`th run has said, if it has.
 fn page(gateway: &Gateway, count: usize) -> Option<String> {
-    let said = gateway.said();
-    let mut pages = said.lines().filter_map(|line| line.split_once("live page: http://")).map(|it| it.1);
-    pages.nth(count - 1).map(|page| page.trim_end_matches('/').to_owned())
+    gateway.list_pages().into_iter().nth(count - 1)
 }
 
 /// Does the box at this address trust its clock, and has it the time of the test?

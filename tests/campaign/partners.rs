@@ -148,13 +148,15 @@ fn delivered(sending: &Sending, count: u64) {
     wait_for("items are delivered", PATIENCE, || (sending.sink()["delivered"].as_u64()? >= count).then_some(()));
 }
 
+/// Is a sink, as the status tells it, at the newest item?
+pub(crate) fn is_caught_up(sink: &Value) -> bool {
+    sink["failing"] == false && sink["behind_items"].as_u64() < Some(200)
+}
+
 /// The sink is at the newest item again. Gives how long that took.
 pub(crate) fn caught_up(sending: &Sending) -> Duration {
     let began = Instant::now();
-    wait_for("the gap is closed", PATIENCE, || {
-        let sink = sending.sink();
-        (sink["failing"] == false && sink["behind_items"].as_u64() < Some(200)).then_some(())
-    });
+    wait_for("the gap is closed", PATIENCE, || is_caught_up(&sending.sink()).then_some(()));
     began.elapsed()
 }
 

@@ -110,6 +110,13 @@ impl Gateway {
         rest.trim_end_matches('/').to_owned()
     }
 
+    /// The addresses of its page, `127.0.0.1:PORT`, one for each time that the box has begun.
+    pub fn list_pages(&self) -> Vec<String> {
+        let said = self.said();
+        let pages = said.lines().filter_map(|line| line.split_once("live page: http://"));
+        pages.map(|(_, page)| page.trim_end_matches('/').to_owned()).collect()
+    }
+
     /// Sends a signal by name: `TERM`, `INT`, `HUP`, `KILL`.
     pub fn signal(&self, name: &str) {
         let sent =

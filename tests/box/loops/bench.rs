@@ -2,7 +2,7 @@
 
 use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::merge::{Delay, Lockstep};
-use adapters::simulated::{ExperimentStep, Moment, Simulated, SimulatedSettings};
+use adapters::simulated::{ExperimentStep, METER_CHANNELS, Moment, Simulated, SimulatedSettings};
 use adapters::{Absence, Actuator, ChannelId, LadderRule, Pull, Sample, Slot, Value};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
 use gateway::gate::offset::{Moved, OffsetAccount, OffsetJournal, OffsetOrder};
@@ -100,16 +100,6 @@ pub(crate) enum LineFault {
     SupplyLower(f64),
 }
 
-/// What the meter delivers.
-const OF_METER: [&str; 6] = [
-    "spindle_power_w",
-    "total_power_w",
-    "spindle_current_a",
-    "supply_voltage_v",
-    "bearing_temperature_c",
-    "ambient_temperature_c",
-];
-
 impl LineFault {
     pub(crate) fn apply(self, sample: &mut Sample) {
         let mut add = |name: &str, by: f64| {
@@ -130,7 +120,7 @@ impl LineFault {
                 }
             }
             Self::ControlSilent | Self::MeterSilent => {
-                let of_meter = |id: ChannelId| OF_METER.contains(&id.name());
+                let of_meter = |id: ChannelId| METER_CHANNELS.contains(&id.name());
                 let silent: Vec<ChannelId> = sample
                     .provided_slots()
                     .map(|(id, _)| id)

@@ -139,10 +139,8 @@ fn a_box_without_a_battery_dates_its_rows_when_the_clock_is_set() {
     gateway.wait_said("are dated");
     // The page is there again, on another port.
     let address = wait_for("the page again", Duration::from_secs(30), || {
-        let said = gateway.said();
-        let pages: Vec<&str> =
-            said.lines().filter_map(|line| line.split_once("live page: http://")).map(|it| it.1).collect();
-        (pages.len() == 2).then(|| pages[1].trim_end_matches('/').to_owned())
+        let pages = gateway.list_pages();
+        (pages.len() == 2).then(|| pages[1].clone())
     });
     ticks(&address, 20);
     assert!((at_s(&address) - now_s()).abs() < 5);

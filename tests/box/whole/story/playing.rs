@@ -99,9 +99,7 @@ impl Story {
 
     /// The addresses of the page, one for each time that the box has begun.
     pub(super) fn pages(&self) -> Vec<String> {
-        let said = self.gateway.said();
-        let pages = said.lines().filter_map(|line| line.split_once("live page: http://"));
-        pages.map(|it| it.1.trim_end_matches('/').to_owned()).collect()
+        self.gateway.list_pages()
     }
 }
 
