@@ -143,6 +143,17 @@ pub(crate) fn mark_rows_since_run(scene: &Scene, run: &str) -> Option<Vec<f64>> 
     Some((0..scene.rows()).map(|row| if row >= start { 1.0 } else { 0.0 }).collect())
 }
 
+/// The form of a step of which only a stretch of runs is known in which it begins. Its shape: `height`, the size that is looked for, and
+/// `deviation`, the noise behind which it is looked for.
+pub const FOLLOWED: &str = "followed";
+
+/// One in the rows in which a step of such a form has begun; `per_height` is what the step adds where its size is one.
+pub(crate) fn follow_step_form(scene: &Scene, form: &Form, per_height: &[f64]) -> Option<Vec<f64>> {
+    let (height, deviation) = (form.shape_value("height")?, form.shape_value("deviation")?);
+    let step: Vec<f64> = per_height.iter().map(|x| height * x).collect();
+    follow_step(scene, &form.place.as_ref()?.1, &step, deviation)
+}
+
 /// Squared deviations gained from which a level is taken to have begun.
 pub const BEGUN: f64 = 12.0;
 

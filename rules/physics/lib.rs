@@ -17,7 +17,7 @@ mod unit;
 
 use adapter_core::channel::quantity::Quantity;
 pub use catalogue::{CATALOGUE, find_effect};
-pub use excitation::{BEGUN, format_run_stretch};
+pub use excitation::{BEGUN, FOLLOWED, format_run_stretch};
 pub use scene::{LinearLaw, OutputKind, PAUSE_PERIODS, Role, Scene, SceneError};
 pub use unit::{find_quantity_unit, resolve_unit};
 
@@ -246,5 +246,11 @@ pub trait Effect: Sync + Send {
     /// earlier rows of a run?
     fn is_followed(&self, _form: &Form) -> bool {
         false
+    }
+
+    /// The form by which a step of this one is written where runs that took no part in the fit lie before the first one that shows it: the step
+    /// may have begun in any of them. `None`: the form has no step.
+    fn find_followed_form(&self, _form: &Form) -> Option<&'static str> {
+        None
     }
 }

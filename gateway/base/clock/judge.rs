@@ -114,6 +114,8 @@ pub(super) struct Judge {
 
 impl Judge {
     /// The first reading of a run: the time at which the box begins. `decided`: the reading has stood long enough already.
+    /// A reading less than a step behind the last certain row agrees with it, as it would have while the box ran: the box goes on
+    /// behind that row, so that no row is dated before it.
     pub(super) fn from_first_reading(
         rules: ClockRules,
         certain: Certain,
@@ -121,8 +123,14 @@ impl Judge {
         decided: bool,
     ) -> (Self, TimeNs) {
         let possible = wall_ns >= super::MADE_NS;
-        let unset = !possible || (!decided && wall_ns < certain.at_least_ns);
-        let now_ns = if unset { certain.at_least_ns.saturating_add(SECOND_NS) } else { wall_ns };
+        let next_ns = certain.at_least_ns.saturating_add(1);
+        let is_step_behind = next_ns.saturating_sub(wall_ns) >= STEP_MIN_NS;
+        let unset = !possible || (!decided && is_step_behind);
+        let now_ns = match (unset, decided) {
+            (false, true) => wall_ns,
+            (false, false) => wall_ns.max(next_ns),
+            (true, _) => next_ns,
+        };
         let base = if unset { Trust::Unset } else { Trust::Plausible };
         let judge = Self { rules, certain, base, agreed_since_ns: now_ns, leap: None, told_ns: None, told: false };
         (judge, now_ns)
@@ -263,7 +271,7 @@ mod tests {
     fn a_box_without_a_battery_goes_on_from_the_last_certain_row_and_follows_soon() {
         for wall_ns in [0, 10 * SECOND_NS, ROW_NS - DAY_NS] {
             let (mut judge, start_ns) = begin(wall_ns);
-            assert_eq!((start_ns, judge.trust()), (ROW_NS + SECOND_NS, Trust::Unset));
+            assert_eq!((start_ns, judge.trust()), (ROW_NS + 1, Trust::Unset));
             let set_ns = |now_ns: TimeNs| {
                 let age_ns = now_ns - start_ns;
                 if age_ns < 60 * SECOND_NS { wall_ns + age_ns } else { NOW_NS + age_ns }
@@ -271,6 +279,30 @@ mod tests {
             let told = run(&mut judge, start_ns, 91, set_ns);
             let shift_ns = NOW_NS - start_ns;
             assert!(told.contains(&(90, ClockNews::Follow { ahead_ns: shift_ns })), "{told:?}");
+        }
+    }
+
+    #[test]
+    fn a_clock_less_than_a_step_behind_the_last_certain_row_is_right_and_no_row_is_dated_before_it() {
+        for (behind_ns, trust) in [
+            (-SECOND_NS, Trust::Plausible),
+            (0, Trust::Plausible),
+            (1, Trust::Plausible),
+            (SECOND_NS / 2, Trust::Plausible),
+            (STEP_MIN_NS - 2, Trust::Plausible),
+            (STEP_MIN_NS - 1, Trust::Unset),
+        ] {
+            let (mut judge, start_ns) = begin(ROW_NS - behind_ns);
+            assert_eq!(
+                (judge.trust(), start_ns),
+                (trust, (ROW_NS - behind_ns).max(ROW_NS + 1)),
+                "{behind_ns} ns behind"
+            );
+            if trust == Trust::Plausible {
+                let ahead_ns = start_ns - (ROW_NS - behind_ns);
+                let told = run(&mut judge, start_ns, 7300, |now_ns| now_ns - ahead_ns);
+                assert_eq!(told, [(7200, ClockNews::Confirmed)], "{behind_ns} ns behind");
+            }
         }
     }
 

@@ -9,7 +9,7 @@
 //! # What is believed
 //! | [`Trust`] | meaning |
 //! |---|---|
-//! | `unset` | the wall clock said at the start what cannot be: a time before this program was made, or before rows that are certain. The box goes on from the last certain time, and everything it stores is provisional |
+//! | `unset` | the wall clock said at the start what cannot be: a time before this program was made, or two seconds and more before rows that are certain. The box goes on from the last certain time, and everything it stores is provisional |
 //! | `plausible` | the wall clock agrees with the box, for less than the time of confirmation |
 //! | `confirmed` | it has agreed for the time of confirmation (two hours unless configured) |
 //! | `leapt` | it says something else than the box. The box keeps its own time |

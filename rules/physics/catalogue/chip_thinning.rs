@@ -13,7 +13,8 @@ static DOC: EffectDoc = EffectDoc {
     kind: "chip_thinning",
     family: "cutting",
     law: "y = gain * L * max(0, 1 - ap / r); of a mill, over the mean chip thickness: y = share * L * ((h / h0)^-mc - 1), \
-          h = 2 fz (ae / D) / arccos(1 - 2 ae / D), h0 its median in the cut",
+          h = 2 fz (ae / D) / arccos(1 - 2 ae / D), h0 its median in the cut, fz the feed per turn where the teeth are not recorded \
+          (their number falls out of h / h0); width: the same with fz = 1, where the simulated cut has the feed in its force already",
     parameters: &[
         ParameterDoc::new_linear(
             "gain",
@@ -59,8 +60,9 @@ impl Effect for ChipThinning {
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
-        let milled = EXPONENTS.map(|mc| Form { name: MILLED, ..Form::from_shape(&[("mc", mc)]) });
-        let mut forms: Vec<Form> = if thickness_varies(scene) { milled.into() } else { Vec::new() };
+        let told = MILLED.into_iter().filter(|name| thickness_varies(scene, name));
+        let mut forms: Vec<Form> =
+            told.flat_map(|name| EXPONENTS.map(|mc| Form { name, ..Form::from_shape(&[("mc", mc)]) })).collect();
         let Some(depth) = scene.column("depth_of_cut_mm").filter(|_| estimate_cut_load(scene).is_some()) else { return forms };
         let cutting = mark_cutting_rows(scene);
         let depths: Vec<f64> = (0..scene.rows()).filter(|row| cutting[*row]).map(|row| depth[row]).collect();
@@ -71,13 +73,13 @@ impl Effect for ChipThinning {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &[MILLED]
+        &MILLED
     }
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
-        if form.name == MILLED {
+        if MILLED.contains(&form.name) {
             let mc = form.shape_value("mc").unwrap_or(0.25);
-            let thickness = compute_relative_thickness(scene)?;
+            let thickness = compute_relative_thickness(scene, form.name)?;
             let law = |row: usize| if thickness[row] > 0.0 { thickness[row].powf(-mc) - 1.0 } else { 0.0 };
             return Some(vec![("share", multiply_cut(scene, law)?)]);
         }
@@ -91,31 +93,66 @@ impl Effect for ChipThinning {
     }
 }
 
-/// The form of a mill, over the mean thickness of its chips.
-const MILLED: &str = "thickness";
+/// The form of a mill in which the feed is in the force of the simulated cut already.
+const WIDTH: &str = "width";
+/// The forms of a mill, over the mean thickness of its chips.
+const MILLED: [&str; 2] = ["thickness", WIDTH];
 /// Exponents that are tried.
 const EXPONENTS: [f64; 2] = [0.2, 0.35];
 /// Deviation of the logarithm of the thickness from which it tells anything.
 const VARIES: f64 = 0.05;
 
-/// Mean thickness of the chips of a mill over its median in the cut; zero where there is no chip.
-fn compute_relative_thickness(scene: &Scene) -> Option<Vec<f64>> {
-    let [feed, width, diameter] =
-        ["feed_per_tooth_mm", "width_of_cut_mm", "diameter_mm"].map(|name| scene.column(name));
-    let (feed, width, diameter) = (feed?, width?, diameter?);
+/// Mean thickness of the chips of a mill in this form, over its median in the cut; zero where there is no chip.
+fn compute_relative_thickness(scene: &Scene, form: &str) -> Option<Vec<f64>> {
+    let [tooth, turn, width, diameter] =
+        ["feed_per_tooth_mm", "feed_per_rev_mm", "width_of_cut_mm", "diameter_mm"].map(|name| scene.column(name));
+    let (width, diameter) = (width?, diameter?);
+    let feed = if form == WIDTH { None } else { Some(tooth.or(turn)?) };
     let cutting = mark_cutting_rows(scene);
     let of = |row: usize| {
         let share = if diameter[row] > 0.0 { (width[row] / diameter[row]).clamp(0.0, 1.0) } else { 0.0 };
-        if !cutting[row] || share <= 0.0 { 0.0 } else { 2.0 * feed[row] * share / (1.0 - 2.0 * share).acos() }
+        let feed = feed.map_or(1.0, |feed| feed[row]);
+        if !cutting[row] || share <= 0.0 { 0.0 } else { 2.0 * feed * share / (1.0 - 2.0 * share).acos() }
     };
     let all: Vec<f64> = (0..scene.rows()).map(of).collect();
     let usual = quantile(all.iter().copied().filter(|h| *h > 0.0), 0.5)?;
     Some(all.iter().map(|h| h / usual).collect())
 }
 
-fn thickness_varies(scene: &Scene) -> bool {
-    let Some(thickness) = compute_relative_thickness(scene).filter(|_| estimate_cut_load(scene).is_some()) else { return false };
+fn thickness_varies(scene: &Scene, form: &str) -> bool {
+    let Some(thickness) = compute_relative_thickness(scene, form).filter(|_| estimate_cut_load(scene).is_some()) else { return false };
     let ln: Vec<f64> = thickness.iter().filter(|h| **h > 0.0).map(|h| h.ln()).collect();
     let middle = numerics::statistics::mean(&ln);
     numerics::statistics::rms(&ln.iter().map(|x| x - middle).collect::<Vec<_>>()) > VARIES
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::law_tests::{column, forms, with_inputs};
+    use crate::Form;
+
+    /// The mean thickness of a chip at a quarter of the diameter is 2 (1/4) / arccos(1/2) of the feed per tooth, at a half 1 / arccos(0).
+    #[test]
+    fn thin_chips_of_a_mill_need_no_number_of_teeth() {
+        let width = |row: usize| [10.0, 20.0, 20.0, 0.0][row % 4];
+        let engaged = |row: usize| f64::from(u8::from(!row.is_multiple_of(4) || row % 8 == 0));
+        let (diameter, turn, load) = (|_: usize| 40.0, |_: usize| 0.3, |_: usize| 100.0);
+        let inputs: [(&str, &dyn Fn(usize) -> f64); 5] = [
+            ("engaged", &engaged),
+            ("width_of_cut_mm", &width),
+            ("diameter_mm", &diameter),
+            ("feed_per_rev_mm", &turn),
+            ("load", &load),
+        ];
+        let mut mill = with_inputs(400, 1.0, "spindle_power_w", &inputs);
+        mill.set_load(Some(vec![100.0; 400]));
+        let names: Vec<&str> = forms("chip_thinning", &mill).iter().map(|form| form.name).collect();
+        assert_eq!(names, ["thickness", "thickness", "width", "width"]);
+        let h = |q: f64| 2.0 * q / (1.0 - 2.0 * q).acos();
+        let expected = 100.0 * ((h(0.25) / h(0.5)).powf(-0.2) - 1.0);
+        for name in ["thickness", "width"] {
+            let law = column("chip_thinning", &mill, &Form { name, ..Form::from_shape(&[("mc", 0.2)]) });
+            assert!((law[8] - expected).abs() < 1e-9 && law[1].abs() < 1e-9, "{name}: {:?} for {expected}", &law[..9]);
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::cut::{estimate_cut_load, multiply_cut};
 use crate::excitation::{
-    compute_ln_count, find_run, follow_step, mark_rows_since_run, build_step_forms, mark_word_rows, mark_rows_within_runs, build_word_forms,
+    FOLLOWED, compute_ln_count, find_run, follow_step_form, mark_rows_since_run, build_step_forms, mark_word_rows, mark_rows_within_runs, build_word_forms,
 };
 use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
@@ -122,8 +122,7 @@ impl Effect for HardnessBatch {
             return compute_inferred_lots(scene, word);
         }
         if form.name == FOLLOWED {
-            let (height, deviation) = (form.shape_value("height")?, form.shape_value("deviation")?);
-            let begun = follow_step(scene, word, &multiply_cut(scene, |_| height)?, deviation)?;
+            let begun = follow_step_form(scene, form, &multiply_cut(scene, |_| 1.0)?)?;
             return Some(vec![("gain", multiply_cut(scene, |row| begun[row])?)]);
         }
         let here = match column.as_str() {
@@ -144,10 +143,11 @@ impl Effect for HardnessBatch {
     fn is_followed(&self, form: &Form) -> bool {
         form.name == FOLLOWED
     }
-}
 
-/// The form of a lot of which only a stretch of runs is known in which it begins.
-pub const FOLLOWED: &str = "followed";
+    fn find_followed_form(&self, form: &Form) -> Option<&'static str> {
+        (form.name == "step").then_some(FOLLOWED)
+    }
+}
 
 /// Names of the gains of the second and further lots.
 const GAINS: [&str; 6] = ["gain_2", "gain_3", "gain_4", "gain_5", "gain_6", "gain_7"];

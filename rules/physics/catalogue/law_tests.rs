@@ -5,7 +5,7 @@ use super::tests::{self, scene, set, set_words};
 use crate::{Form, Scene};
 use recording::Recording;
 
-fn column(kind: &str, scene: &Scene, form: &Form) -> Vec<f64> {
+pub(super) fn column(kind: &str, scene: &Scene, form: &Form) -> Vec<f64> {
     tests::column(find_effect(kind).expect("known"), scene, form)
 }
 
@@ -77,14 +77,14 @@ fn run_out_needs_more_than_two_samples_per_turn() {
 }
 
 /// Rows at this period with these inputs and an output of one.
-fn with_inputs(rows: u32, period_s: f64, output: &str, inputs: &[(&str, &dyn Fn(usize) -> f64)]) -> Scene {
+pub(super) fn with_inputs(rows: u32, period_s: f64, output: &str, inputs: &[(&str, &dyn Fn(usize) -> f64)]) -> Scene {
     let mut recording = Recording::new("inputs", (0..rows).map(|row| period_s * f64::from(row)).collect(), None);
     inputs.iter().for_each(|(name, law)| set(&mut recording, name, law));
     set(&mut recording, output, |_| 1.0);
     scene(&recording, output)
 }
 
-fn forms(kind: &str, scene: &Scene) -> Vec<Form> {
+pub(super) fn forms(kind: &str, scene: &Scene) -> Vec<Form> {
     find_effect(kind).expect("known").propose_forms(scene)
 }
 

@@ -1,6 +1,8 @@
 //! The meter shows a fixed share too much or too little.
 
-use crate::excitation::{compute_recording_share, mark_rows_since_run, build_step_forms, has_variation};
+use crate::excitation::{
+    FOLLOWED, build_step_forms, compute_recording_share, follow_step_form, has_variation, mark_rows_since_run,
+};
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Gain of the meter.
@@ -10,14 +12,30 @@ pub struct SensorGain;
 static DOC: EffectDoc = EffectDoc {
     kind: "sensor_gain",
     family: "measurement",
-    law: "y = gain * S, S the simulated output; from one run on, or growing as share of the recording - 1/2",
-    parameters: &[ParameterDoc::new_linear(
-        "gain",
-        "1",
-        (-0.5, 0.5),
-        "share by which the meter shows too much",
-        "仪表多显示的比例",
-    )],
+    law: "y = gain * S, S the simulated output; from one run on, or growing as share of the recording - 1/2; followed: from some run of a stretch on, as the earlier rows of each run tell",
+    parameters: &[
+        ParameterDoc::new_linear(
+            "gain",
+            "1",
+            (-0.5, 0.5),
+            "share by which the meter shows too much",
+            "仪表多显示的比例",
+        ),
+        ParameterDoc::new_shape(
+            "height",
+            "1",
+            (-0.5, 0.5),
+            "the gain that is looked for in runs in which it may have begun",
+            "在可能已开始的运行中查找的比例",
+        ),
+        ParameterDoc::new_shape(
+            "deviation",
+            "output",
+            (0.0, 1e9),
+            "noise behind which it is looked for",
+            "识别变化时的噪声",
+        ),
+    ],
     needs: &["the simulated output"],
     source: "current transformers and shunts: 1-3 %",
     experiment_minutes: 5.0,
@@ -44,7 +62,7 @@ impl Effect for SensorGain {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &["constant", "drift", "step"]
+        &["constant", "drift", "step", FOLLOWED]
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
@@ -59,10 +77,19 @@ impl Effect for SensorGain {
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         let simulated = scene.simulated_output()?;
         let factor = match (form.name, &form.place) {
+            (FOLLOWED, _) => follow_step_form(scene, form, simulated)?,
             ("step", Some((_, run))) => mark_rows_since_run(scene, run)?,
             ("drift", _) => compute_recording_share(scene).iter().map(|share| share - 0.5).collect(),
             _ => vec![1.0; scene.rows()],
         };
         Some(vec![("gain", simulated.iter().zip(&factor).map(|(value, factor)| value * factor).collect())])
+    }
+
+    fn is_followed(&self, form: &Form) -> bool {
+        form.name == FOLLOWED
+    }
+
+    fn find_followed_form(&self, form: &Form) -> Option<&'static str> {
+        (form.name == "step").then_some(FOLLOWED)
     }
 }

@@ -48,7 +48,6 @@ pub(super) struct RecordingInputs<'a> {
     pub(super) voltage: Option<Vec<f64>>,
     pub(super) depth: Option<Vec<f64>>,
     pub(super) width: Option<Vec<f64>>,
-    pub(super) diameter: Option<Vec<f64>>,
     pub(super) feed: Option<Vec<f64>>,
     pub(super) cutting_speed: Option<Vec<f64>>,
     /// The simulated cut in the output's unit; a stand-in of constant height in the cut where the model has none.
@@ -104,7 +103,6 @@ impl<'a> RecordingInputs<'a> {
             voltage: own(Role::Voltage),
             depth: column("depth_of_cut_mm"),
             width: column("width_of_cut_mm"),
-            diameter: column("diameter_mm"),
             feed: column("feed_per_rev_mm"),
             cutting_speed: column("cutting_speed_m_min"),
             cut: scene.load().map(<[f64]>::to_vec).filter(|cut| cut.iter().any(|x| x.abs() > 0.0)),

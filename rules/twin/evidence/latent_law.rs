@@ -6,7 +6,6 @@ use crate::departure::is_of_departure;
 use crate::model::{Parameter, Part};
 use numerics::statistics::{count_to_f64, robust_deviation};
 use physics::catalogue::auxiliary_switch::LATENT;
-use physics::catalogue::hardness_batch::FOLLOWED;
 use physics::{Entry, Form, find_effect, format_run_stretch};
 
 /// The kind that has such a form.
@@ -64,11 +63,11 @@ pub(super) fn write_latent_part(inputs: &RecordingInputs<'_>, part: &Part, on: &
     Some(part)
 }
 
-/// A lot that begins with a fitted run, as it stands in a file: where the runs before it took no part in the fit it may have begun
+/// A step that begins with a fitted run, as it stands in a file: where the runs before it took no part in the fit it may have begun
 /// there, and their own earlier rows tell. `None` of every other part.
 pub(super) fn write_followed_step(inputs: &RecordingInputs<'_>, part: &Part, deviation: f64) -> Option<Part> {
-    let (effect, form) =
-        part.effect_and_form().filter(|(_, form)| part.kind == "hardness_batch" && form.name == "step")?;
+    let (effect, form) = part.effect_and_form()?;
+    let name = effect.find_followed_form(&form)?;
     let (column, run) = form.place?;
     let (runs, names) = (inputs.scene.runs(), inputs.scene.run_names());
     let is_fitted = |run: &usize| runs[*run].clone().any(|row| inputs.fitted[row]);
@@ -79,7 +78,7 @@ pub(super) fn write_followed_step(inputs: &RecordingInputs<'_>, part: &Part, dev
     let gain = part.find_parameter("gain")?;
     let place = Some((column, format_run_stretch(names.get(first)?, names.get(last)?)));
     let shape = [("height", gain.value), ("deviation", deviation)];
-    let form = Form { name: FOLLOWED, place, ..Form::from_shape(&shape) };
+    let form = Form { name, place, ..Form::from_shape(&shape) };
     let mut followed = Part::from_effect(effect, &form, &["gain"]);
     followed.parameters.iter_mut().filter(|p| p.name == "gain").for_each(|p| p.clone_from(gain));
     followed.parameters.iter_mut().filter(|p| p.name == "deviation").for_each(settle_shape);

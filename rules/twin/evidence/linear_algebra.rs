@@ -6,6 +6,7 @@
 
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array1, Array2, ArrayView2, Axis, s};
+use numerics::linear::columns::dot;
 
 /// Columns of a panel of a symmetric product: below it, what is computed twice costs less than a call.
 const PANEL: usize = 96;
@@ -178,14 +179,14 @@ pub(super) struct Resolved {
 }
 
 impl Tridiagonal {
-    /// Householder's reduction of `a`, the vector `b` reflected with it.
-    pub(super) fn reduce_matrix(mut a: Array2<f64>, mut b: Vec<f64>) -> Self {
-        let size = a.nrows();
+    /// Householder's reduction of the rows `a` of a symmetric matrix, the vector `b` reflected with it.
+    pub(super) fn reduce_matrix(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Self {
+        let size = a.len();
         for k in 0..size.saturating_sub(2) {
             apply_reflection(&mut a, &mut b, k);
         }
-        let beside = (1..size).map(|k| a[[k, k - 1]]).collect();
-        Self { diagonal: a.diag().to_vec(), off_diagonal: beside, along: b }
+        let off_diagonal = (1..size).map(|k| a[k][k - 1]).collect();
+        Self { diagonal: (0..size).map(|k| a[k][k]).collect(), off_diagonal, along: b }
     }
 
     /// Solves with `I + lambda A` from the last axis to the first.
@@ -210,35 +211,28 @@ impl Tridiagonal {
     }
 }
 
-/// Reflects the axes after `k` so that of column `k` only the entry below the diagonal is left.
-fn apply_reflection(a: &mut Array2<f64>, b: &mut [f64], k: usize) {
-    let size = a.nrows();
-    let norm = (k + 1..size).map(|i| a[[i, k]] * a[[i, k]]).sum::<f64>().sqrt();
-    let rest = (k + 2..size).map(|i| a[[i, k]] * a[[i, k]]).sum::<f64>();
+/// Reflects the axes after `k` of a symmetric matrix, row by row, so that of column `k` only the entry below the diagonal is left.
+fn apply_reflection(a: &mut [Vec<f64>], b: &mut [f64], k: usize) {
+    let mut v: Vec<f64> = a[k + 1..].iter().map(|row| row[k]).collect();
+    let (norm, rest) = (dot(&v, &v).sqrt(), dot(&v[1..], &v[1..]));
     if rest <= 1e-30 * norm * norm || norm <= 0.0 {
         return;
     }
-    let head = a[[k + 1, k]];
-    let target = if head > 0.0 { -norm } else { norm };
-    let mut v: Vec<f64> = (k + 1..size).map(|i| a[[i, k]]).collect();
+    let target = if v[0] > 0.0 { -norm } else { norm };
     v[0] -= target;
-    let half = 0.5 * v.iter().map(|x| x * x).sum::<f64>();
-    let share = v.iter().zip(&b[k + 1..]).map(|(v, b)| v * b).sum::<f64>() / half;
+    let half = 0.5 * dot(&v, &v);
+    let share = dot(&v, &b[k + 1..]) / half;
     b[k + 1..].iter_mut().zip(&v).for_each(|(b, v)| *b -= share * v);
     // A - v w' - w v' with w = A v / half - v (v' A v / half) / (2 half).
-    let line = |i: usize, a: &Array2<f64>| v.iter().enumerate().map(|(j, v)| a[[i, k + 1 + j]] * v).sum::<f64>() / half;
-    let mut w: Vec<f64> = (k + 1..size).map(|i| line(i, a)).collect();
-    let turn = v.iter().zip(&w).map(|(v, w)| v * w).sum::<f64>() / (2.0 * half);
+    let mut w: Vec<f64> = a[k + 1..].iter().map(|row| dot(&row[k + 1..], &v) / half).collect();
+    let turn = dot(&v, &w) / (2.0 * half);
     w.iter_mut().zip(&v).for_each(|(w, v)| *w -= turn * v);
-    for i in 0..v.len() {
-        for j in 0..v.len() {
-            a[[k + 1 + i, k + 1 + j]] -= v[i] * w[j] + w[i] * v[j];
-        }
+    for (row, (v_here, w_here)) in a[k + 1..].iter_mut().zip(v.iter().zip(&w)) {
+        row[k + 1..].iter_mut().zip(v.iter().zip(&w)).for_each(|(x, (v, w))| *x -= v_here * w + w_here * v);
+        row[k] = 0.0;
     }
-    for i in k + 1..size {
-        let x = if i == k + 1 { target } else { 0.0 };
-        (a[[i, k]], a[[k, i]]) = (x, x);
-    }
+    a[k][k + 1..].fill(0.0);
+    (a[k + 1][k], a[k][k + 1]) = (target, target);
 }
 
 #[cfg(test)]
@@ -281,7 +275,9 @@ mod tests {
         let lambda = 0.03;
         let inner = Array2::eye(5) + gram() * lambda;
         let x = CholeskyFactor::from_matrix(&inner).solve_system(&Array1::from(b.clone()));
-        let resolved = Tridiagonal::reduce_matrix(gram(), b.clone()).solve_shifted_system(lambda);
+        let resolved =
+            Tridiagonal::reduce_matrix(gram().rows().into_iter().map(|row| row.to_vec()).collect(), b.clone())
+                .solve_shifted_system(lambda);
         assert!((resolved.ln_determinant - CholeskyFactor::from_matrix(&inner).ln_determinant()).abs() < 1e-9);
         assert!((resolved.square - lambda * x.dot(&Array1::from(b))).abs() < 1e-9);
         assert!((resolved.first - x[0]).abs() < 1e-9);

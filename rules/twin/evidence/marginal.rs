@@ -262,14 +262,14 @@ impl Comparison<'_> {
         let d = &self.bank.variants[variant].relative;
         let size = d.len();
         let Some(first) = state.ground.starts[variant] else {
-            return Tridiagonal::reduce_matrix(Array2::zeros((size, size)), vec![0.0; size]);
+            return Tridiagonal::reduce_matrix(vec![vec![0.0; size]; size], vec![0.0; size]);
         };
         let last = state.ground.gram.nrows() - 1;
-        let mut inner = Array2::zeros((size, size));
+        let mut inner = vec![vec![0.0; size]; size];
         for i in 0..size {
             for j in 0..=i {
                 let x = state.compute_entry(first + i, first + j) * d[i] * d[j];
-                (inner[[i, j]], inner[[j, i]]) = (x, x);
+                (inner[i][j], inner[j][i]) = (x, x);
             }
         }
         let b = (0..size).map(|k| state.compute_entry(first + k, last) * d[k]).collect();

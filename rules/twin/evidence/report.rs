@@ -30,7 +30,7 @@ use crate::summary;
 use crate::text_report::{format_short_number, format_signed_number};
 use adapter_core::bilingual::Bilingual;
 use numerics::statistics::{count_to_f64, rms};
-use physics::{Entry, find_effect};
+use physics::{Entry, FOLLOWED, find_effect};
 use recording::Recording;
 use std::cell::OnceCell;
 
@@ -335,10 +335,10 @@ fn describe_held_shapes(part: &Part) -> String {
 
 /// Why a part cannot be simulated ahead.
 fn describe_hindrance(part: &Part) -> Option<Bilingual> {
-    if part.is_followed() && part.kind == "hardness_batch" {
+    if part.is_followed() && part.has_form(FOLLOWED) {
         return Some(Bilingual::new(
-            "The run in which this lot begins is not known: it is followed from earlier rows of the same run and cannot be simulated ahead",
-            "不知该批料从哪一批次开始：只能由同一批次的先前各行跟踪，无法预先仿真",
+            "The run in which this change begins is not known: it is followed from earlier rows of the same run and cannot be simulated ahead",
+            "不知该变化从哪次运行开始：只能由同一次运行的先前各行跟踪，无法预先仿真",
         ));
     }
     if part.is_followed() {

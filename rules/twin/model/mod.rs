@@ -136,7 +136,7 @@ impl Part {
 
     /// Is it an effect of the catalogue in the form of this name?
     #[must_use]
-    pub(super) fn has_form(&self, name: &str) -> bool {
+    pub(crate) fn has_form(&self, name: &str) -> bool {
         matches!(&self.body, PartFunction::Effect(_, form) if form.name == name)
     }
 
@@ -331,7 +331,8 @@ fn simulate_stages<'a>(
     let in_between = |part: &Part| !(part.is_cut() || losses && part.is_load_loss() || late(part));
     run_stage(parts, scene, before, &mut contributions, &mut total, in_between)?;
     scene.set_simulated(Some(total.clone()));
-    for last in [Part::acts_on_output, Part::is_followed] {
+    for followed in [false, true] {
+        let last = |part: &Part| late(part) && part.is_followed() == followed;
         if parts.iter().any(last) {
             run_stage(parts, scene, before, &mut contributions, &mut total, last)?;
             scene.set_simulated(Some(total.clone()));

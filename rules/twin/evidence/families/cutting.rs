@@ -23,7 +23,6 @@ const TAPER: Family = Family::from_kind("depth_taper").with_edge_action().with_c
 const ENTRY: Family = Family::from_kind("entry_exit").with_catalogue_forms().with_rarity(-0.5).with_edge_action();
 const THINNING: Family =
     Family::from_kind("chip_thinning").with_catalogue_forms().with_sign(1.0).with_channels(&["depth_of_cut_mm"]);
-const THINNING_WIDTH: Family = Family::from_kind("chip_thinning").with_catalogue_forms().with_rarity(-0.5);
 const TIMING: Family =
     Family::from_kind("engagement_timing").with_catalogue_forms().with_rarity(-0.7).with_edge_action();
 const RECIPE: Family = Family::from_kind("recipe_error").with_catalogue_forms().with_rarity(-0.5);
@@ -188,13 +187,6 @@ fn add_chip_thinning(inputs: &RecordingInputs<'_>, cut: &[f64], bank: &mut Varia
                 bank.begin_variant(THINNING, radius).add_column(inputs, law);
             }
         }
-    }
-    if let (Some(width), Some(diameter)) = (&inputs.width, &inputs.diameter) {
-        let thin = |row: usize| {
-            let q = (width[row] / diameter[row].max(0.1)).clamp(0.0, 1.0);
-            if q < 0.5 { 1.0 - 2.0 * (q * (1.0 - q)).max(0.0).sqrt() } else { 0.0 }
-        };
-        bank.begin_variant(THINNING_WIDTH, "width").add_column(inputs, inputs.build_column(|row| cut[row] * thin(row)));
     }
 }
 
