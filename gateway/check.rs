@@ -193,7 +193,7 @@ fn check_thermal(config: &Config, report: &mut CheckReport) {
     let name = path.display().to_string();
     let read = std::fs::read_to_string(path)
         .map_err(|error| format!("the thermal law cannot be read: {error}"))
-        .and_then(|text| ThermalModel::read(&text, &config.gateway.name));
+        .and_then(|text| ThermalModel::read(&text, &config.gateway.machine.name));
     match read {
         Ok(model) => report.read.push(format!("{name}: a thermal law of {} terms", model.law.terms.len())),
         Err(what) => {

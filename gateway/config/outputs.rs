@@ -13,6 +13,7 @@ use std::time::Duration;
 pub(super) fn build_sinks(reading: &mut ConfigInput<'_>) -> Option<Vec<SinkConfig>> {
     let sinks: Option<Vec<SinkConfig>> = reading.sinks.iter().map(build_sink).collect();
     requests_need_a_way_in(reading);
+    places_need_a_path(reading);
     let names: Vec<Option<String>> = reading.sinks.iter().map(source_name).collect();
     for (index, name) in names.iter().enumerate().filter(|(_, name)| name.is_some()) {
         if names[..index].contains(name) {
@@ -44,6 +45,22 @@ fn requests_need_a_way_in(reading: &mut ConfigInput<'_>) {
     for (origin, address) in deaf {
         let what = format!("`allow_requests = true`, but nothing can be asked for through {}:", address.scheme());
         reading.add_problem(&origin, what, "leave it out, or use an mqtts:// or sparkplugs:// sink");
+    }
+}
+
+/// A sink whose address leaves the place of the machine to its path needs one.
+fn places_need_a_path(reading: &mut ConfigInput<'_>) {
+    if find_text(reading, "gateway", "path").is_some() {
+        return;
+    }
+    let missing = |values: &SectionValues| {
+        let found = values.found.get("address")?;
+        let address: SinkAddress = as_text(found)?.parse().ok()?;
+        Some((found.origin.clone(), address.find_need_of_path()?))
+    };
+    let missing: Vec<_> = reading.sinks.iter().filter_map(missing).collect();
+    for (origin, (what, next)) in missing {
+        reading.add_problem(&origin, what, next);
     }
 }
 

@@ -269,7 +269,7 @@ fn build_ticker(
     if let Some(thermal) = &mut thermal {
         thermal.report_notices(&mut health, start_ns);
     }
-    let text = format!("{} is being polled; everything is kept in {}", identity.machine, data_dir.display());
+    let text = format!("{} is being polled; everything is kept in {}", identity.machine.name, data_dir.display());
     health.record_event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
     told.iter().for_each(|notice| health.record_event(start_ns, "gateway", notice));
     started.notices.iter().for_each(|notice| health.record_event(start_ns, "clock", notice));
@@ -304,7 +304,7 @@ fn build_ticker(
 
 fn build_identity(plan: &RunPlan, simulated: bool) -> Identity {
     let gateway = &plan.config.gateway;
-    Identity { machine: gateway.name.clone(), simulated, speed: plan.speed.time_factor(), rate_hz: gateway.tick_hz }
+    Identity { machine: gateway.machine.clone(), simulated, speed: plan.speed.time_factor(), rate_hz: gateway.tick_hz }
 }
 
 /// Now; an accelerated machine begins after everything that the history already holds.

@@ -1,4 +1,4 @@
--- Version 3. What `cnc-gateway fleet ingest` creates. Times are those of the machines; `arrived` is when the stream had the item.
+-- Version 4. What `cnc-gateway fleet ingest` creates. Times are those of the machines; `arrived` is when the stream had the item.
 CREATE TABLE fleet_schema (
   version int PRIMARY KEY,
   since timestamptz NOT NULL DEFAULT now()

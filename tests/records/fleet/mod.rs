@@ -4,6 +4,7 @@
 //! they fail.
 
 mod boxes;
+mod identity;
 mod killed;
 mod means;
 mod monitoring;
