@@ -12,8 +12,8 @@
 //! The machine is known by its path, the box beside it by the name that was made with its history. A box that takes the place of
 //! another one gets the same path: topics, identifiers and tables of the machine go on, and each item still names the box that has made it.
 //!
-//! Every output asks this type for its text and knows no level by itself: [`MachinePath::topic`], [`MachinePath::dotted`],
-//! [`MachinePath::group`], [`MachinePath::list_levels`]. A box without a path tells what it told before there were paths.
+//! Every output asks this type for its text and knows no level by itself: [`MachinePath::format_topic`], [`MachinePath::format_dotted`],
+//! [`MachinePath::format_group`], [`MachinePath::list_levels`]. A box without a path tells what it told before there were paths.
 
 use serde::{Serialize, Serializer};
 use std::fmt;
@@ -92,25 +92,25 @@ impl MachinePath {
 
     /// With slashes, for topics and documents: `shanghai/line-2/lathe-7`.
     #[must_use]
-    pub fn topic(&self) -> String {
+    pub fn format_topic(&self) -> String {
         self.words.join("/")
     }
 
     /// With points, for subjects, identifiers and names: `shanghai.line-2.lathe-7`. No word holds a point, so that it can be divided again.
     #[must_use]
-    pub fn dotted(&self) -> String {
+    pub fn format_dotted(&self) -> String {
         self.words.join(".")
     }
 
     /// The levels before the machine with points: `shanghai.line-2`.
     #[must_use]
-    pub fn group(&self) -> String {
+    pub fn format_group(&self) -> String {
         self.split_machine().1.join(".")
     }
 
     /// The word of the machine alone: `lathe-7`.
     #[must_use]
-    pub fn machine(&self) -> &str {
+    pub fn machine_word(&self) -> &str {
         self.split_machine().0
     }
 
@@ -124,7 +124,7 @@ impl MachinePath {
 
 impl fmt::Display for MachinePath {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.topic())
+        f.write_str(&self.format_topic())
     }
 }
 
@@ -137,7 +137,7 @@ impl Serialize for MachinePath {
 impl FromStr for MachinePath {
     type Err = MachinePathError;
 
-    /// Reads what [`MachinePath::topic`] writes.
+    /// Reads what [`MachinePath::format_topic`] writes.
     fn from_str(text: &str) -> Result<Self, MachinePathError> {
         let (above, machine) = text.rsplit_once('/').ok_or(MachinePathError::Count { found: 0 })?;
         Self::new(above, machine)
@@ -166,13 +166,16 @@ mod tests {
     #[test]
     fn every_output_has_its_text_and_every_level_its_name() {
         let path = MachinePath::new("shanghai/line-2", "lathe-7").expect("a path");
-        assert_eq!(path.topic(), "shanghai/line-2/lathe-7");
-        assert_eq!((path.dotted(), path.group()), ("shanghai.line-2.lathe-7".to_owned(), "shanghai.line-2".to_owned()));
+        assert_eq!(path.format_topic(), "shanghai/line-2/lathe-7");
+        assert_eq!(
+            (path.format_dotted(), path.format_group()),
+            ("shanghai.line-2.lathe-7".to_owned(), "shanghai.line-2".to_owned())
+        );
         assert_eq!(
             path.list_levels().collect::<Vec<_>>(),
             [("site", "shanghai"), ("line", "line-2"), ("machine", "lathe-7")]
         );
-        assert_eq!(path.topic().parse(), Ok(path));
+        assert_eq!(path.format_topic().parse(), Ok(path));
         let names = |above: &str| {
             let path = MachinePath::new(above, "m").expect("a path");
             path.list_levels().map(|(level, word)| format!("{level}={word}")).collect::<Vec<_>>().join(" ")

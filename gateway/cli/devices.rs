@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &DevicesArguments) -> CommandResult {
             "write a letter, then letters, digits and _",
         ));
     }
-    let device = machine.path.as_ref().map_or(box_id, MachinePath::dotted);
+    let device = machine.path.as_ref().map_or(box_id, MachinePath::format_dotted);
     let delivered = read_delivered_channels(path);
     let created = moment::format_utc(clock::now_ns());
     let known = |channel: &str| delivered.as_ref().is_none_or(|names| names.contains(channel));

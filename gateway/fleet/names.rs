@@ -79,7 +79,8 @@ async fn note_place(
             let level =
                 |name: &str| path.list_levels().find(|(level, _)| *level == name).map(|(_, word)| word.to_owned());
             let [enterprise, site, area, line] = ["enterprise", "site", "area", "line"].map(level);
-            let values: [&(dyn ToSql + Sync); 6] = [&path.topic(), &enterprise, &site, &area, &line, &path.machine()];
+            let values: [&(dyn ToSql + Sync); 6] =
+                [&path.format_topic(), &enterprise, &site, &area, &line, &path.machine_word()];
             Some(client.query_one(NAME_MACHINE, &values).await?.get(0))
         }
     };

@@ -134,7 +134,7 @@ fn check_path(path: Option<&str>, subject: &str, box_name: &str) -> Result<Optio
     let path: MachinePath =
         text.parse().map_err(|error| RefusedMessage(format!("the path of the machine cannot be used: {error}")))?;
     let place = subject.rsplit_once('.').and_then(|(before, _kind)| before.strip_suffix(box_name));
-    let expected = format!(".{}.", path.dotted());
+    let expected = format!(".{}.", path.format_dotted());
     match place.is_some_and(|place| place.ends_with(&expected)) {
         true => Ok(Some(path)),
         false => refuse_message("the subject belongs to another machine than the path in the document says"),
@@ -239,6 +239,10 @@ impl<'a> FleetRow<'a> {
     /// Its time is so much later: the clock of the box had been wrong when it was sent. Means are of other minutes then, and the box tells
     /// those anew; a gap before the first sample of a run begins with the run before.
     pub(super) fn shift_time(&mut self, by_ns: i64) {
+        // The times of a fact are those of whoever told it.
+        if self.kind == "fact" {
+            return;
+        }
         self.redated_ns = self.redated_ns.saturating_add(by_ns);
         if !self.means.is_empty() {
             self.means.clear();

@@ -8,12 +8,13 @@ use std::collections::BTreeSet;
 use tokio_postgres::{Client, Transaction};
 
 /// The version of the tables that this program writes.
-const VERSION: i32 = 4;
+const VERSION: i32 = 5;
 /// The statements that create the tables of the fleet database.
 pub const TABLES: &str = concat!(
     include_str!("schema/tables.sql"),
     include_str!("schema/clock_moves.sql"),
-    include_str!("schema/machines.sql")
+    include_str!("schema/machines.sql"),
+    include_str!("schema/facts.sql")
 );
 /// The views and functions.
 pub const VIEWS: &str = include_str!("schema/views.sql");
@@ -25,9 +26,10 @@ pub(super) const RECORDS: &str = include_str!("schema/records.sql");
 const FROM_1: [&str; 2] = [include_str!("schema/migrate_1.sql"), include_str!("schema/migrate_1_rows.sql")];
 
 /// From each version on, what it lacks of the next one. From version 2: epochs of items, and times that move. From version 3: machines
-/// beside their boxes.
+/// beside their boxes. From version 4: facts of production.
 const FROM_2: &str = concat!(include_str!("schema/migrate_2.sql"), include_str!("schema/clock_moves.sql"));
 const FROM_3: &str = include_str!("schema/machines.sql");
+const FROM_4: &str = include_str!("schema/facts.sql");
 /// Items of a wrong clock: which move, and, after their partitions are there, everything made of them.
 pub(super) const REDATE: [&str; 2] = [include_str!("schema/redate.sql"), include_str!("schema/redate_rows.sql")];
 
@@ -175,8 +177,9 @@ pub(super) async fn bring_up(client: &mut Client) -> Result<Partitioning, NatsEr
     match read_version(&transaction).await? {
         0 => create_tables(&transaction, partitioning).await?,
         1 => from_1(&transaction, partitioning).await?,
-        2 => change_tables(&transaction, 2, &[FROM_2, FROM_3]).await?,
-        3 => change_tables(&transaction, 3, &[FROM_3]).await?,
+        2 => change_tables(&transaction, 2, &[FROM_2, FROM_3, FROM_4]).await?,
+        3 => change_tables(&transaction, 3, &[FROM_3, FROM_4]).await?,
+        4 => change_tables(&transaction, 4, &[FROM_4]).await?,
         VERSION => {}
         newer => {
             let what = format!("the tables have version {newer}, this program knows {VERSION}");

@@ -97,7 +97,7 @@ fn format_label(name: &str, value: &str) -> String {
 fn format_identity(status: &Status) -> String {
     let name = |level: &'static str| if level == "machine" { "machine_id" } else { level };
     let levels = status.path.iter().flat_map(MachinePath::list_levels);
-    let place = status.path.iter().map(|path| format_label("path", &path.topic()));
+    let place = status.path.iter().map(|path| format_label("path", &path.format_topic()));
     [format_label("version", status.version), format_label("machine", &status.machine)]
         .into_iter()
         .chain(place)

@@ -6,6 +6,7 @@ pub mod command;
 pub mod deadline;
 mod end;
 pub mod energy;
+mod facts;
 pub mod health;
 pub mod history_store;
 pub mod live_twin;
@@ -75,7 +76,6 @@ use wear::Wear;
 const BLOCKING_MAX: usize = 6;
 /// Time between two looks at the file of persons.
 const FOLLOW_EVERY: Duration = Duration::from_secs(1);
-
 /// Time between two signs of life of the threads that answer the page.
 const PAGE_BEAT: Duration = Duration::from_secs(1);
 

@@ -97,6 +97,12 @@ impl SinkAddress {
         matches!(self.target, SinkTarget::Mqtt(_) | SinkTarget::Sparkplug(_))
     }
 
+    /// Can a computer on the network of this sink tell the box facts of production?
+    #[must_use]
+    pub fn can_receive_facts(&self) -> bool {
+        matches!(self.target, SinkTarget::Mqtt(_))
+    }
+
     /// What the address leaves to the path of the machine, and what to do where there is none.
     #[must_use]
     pub fn find_need_of_path(&self) -> Option<(&'static str, &'static str)> {

@@ -62,7 +62,7 @@ impl NatsSink {
         let id = self.outbox.box_id();
         // `doctor` asks before there is a box.
         let id = if id.is_empty() { "doctor" } else { &id };
-        let place = self.outbox.path().map(|path| format!("{}.", path.dotted())).unwrap_or_default();
+        let place = self.outbox.path().map(|path| format!("{}.", path.format_dotted())).unwrap_or_default();
         format!("{}.{place}{id}.{kind}", self.target.prefix)
     }
 

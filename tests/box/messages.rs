@@ -158,7 +158,7 @@ fn a_path_that_some_output_could_not_carry_is_refused() {
     let fine =
         "[gateway]\nname = \"Lathe 7\"\npath = \"shanghai/line-2\"\n[[source]]\naddress = \"simulated://lathe\"\n";
     let config = parse(fine, &[]).expect("all of it is right");
-    assert_eq!(config.gateway.machine.path.map(|path| path.topic()), Some("shanghai/line-2/Lathe-7".to_owned()));
+    assert_eq!(config.gateway.machine.path.map(|path| path.format_topic()), Some("shanghai/line-2/Lathe-7".to_owned()));
 }
 
 #[test]

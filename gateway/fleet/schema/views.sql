@@ -192,3 +192,11 @@ CREATE OR REPLACE VIEW decisions AS
   FROM decision_list JOIN boxes USING (box_id);
 CREATE OR REPLACE VIEW diagnoses AS
   SELECT boxes.machine, boxes.box, at, verdict, summary, diagnosis, sequence, box_id, fleet_path(box_id, at) AS path FROM diagnosis_list JOIN boxes USING (box_id);
+
+-- What the plant has told. `order`, `operator` and `shift` hold until the next fact of their kind: `until` is then its beginning.
+CREATE OR REPLACE VIEW facts AS
+  SELECT boxes.machine, boxes.box, fact_list.since,
+         CASE WHEN fact IN ('order', 'operator', 'shift') THEN lead(fact_list.since) OVER (PARTITION BY place.label, fact ORDER BY fact_list.since, fact_list.at) ELSE fact_list.until END AS until,
+         fact, value, parts, mark, way, author, fact_list.at, sequence, fact_list.box_id, place.path, place.label
+  FROM fact_list JOIN boxes USING (box_id)
+  JOIN placements AS place ON place.box_id = fact_list.box_id AND fact_list.since >= place.since AND fact_list.since < place.until;

@@ -153,7 +153,7 @@ impl Outbox {
     /// itself where there is no path.
     #[must_use]
     pub fn device_name(&self) -> String {
-        self.path().map_or_else(|| self.box_id(), MachinePath::dotted)
+        self.path().map_or_else(|| self.box_id(), MachinePath::format_dotted)
     }
 
     /// Names this box and this history: letters, digits and `-` of the name that the machine had at first, `-`, and digits that

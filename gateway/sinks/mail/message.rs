@@ -57,7 +57,7 @@ fn format_body(outbox: &Outbox, AlarmMessage { item, alarm, historical }: AlarmM
     }
     lines.push(String::new());
     let began = moment::format_utc(item.at_ns);
-    let path = outbox.path().map(|path| ("path", path.topic()));
+    let path = outbox.path().map(|path| ("path", path.format_topic()));
     let fields = [
         ("severity", alarm.severity.clone()),
         ("code", alarm.code.clone()),

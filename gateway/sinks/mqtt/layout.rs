@@ -47,7 +47,7 @@ pub(crate) fn build_document(outbox: &Outbox, item: &Item, historical: bool) -> 
     document["machine"] = Json::from(outbox.machine());
     document["box"] = Json::from(outbox.box_id());
     if let Some(path) = outbox.path() {
-        document["path"] = Json::from(path.topic());
+        document["path"] = Json::from(path.format_topic());
     }
     document["historical"] = Json::from(historical);
     document
@@ -117,7 +117,7 @@ fn build_common_fields(outbox: &Outbox, at_ns: TimeNs) -> Map<String, Json> {
         ("machine", json!(outbox.machine())),
         ("box", json!(outbox.box_id())),
     ];
-    let path = outbox.path().map(|path| ("path", json!(path.topic())));
+    let path = outbox.path().map(|path| ("path", json!(path.format_topic())));
     fields.into_iter().chain(path).map(|(name, value)| (name.to_owned(), value)).collect()
 }
 

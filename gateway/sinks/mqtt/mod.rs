@@ -5,7 +5,8 @@
 //! `latest_s`.
 //!
 //! With `allow_requests` the box subscribes `PREFIX/request` and hands what comes to the gate ([`Requests`]); the answer goes to
-//! `PREFIX/request/answer`, and what became of it in the end to `PREFIX/request/outcome`. Without it nothing is subscribed: a network cannot ask the box for anything this way.
+//! `PREFIX/request/answer`, and what became of it in the end to `PREFIX/request/outcome`. With `allow_facts` it subscribes `PREFIX/fact/add`, and
+//! answers on `PREFIX/fact/answer`. Without them nothing is subscribed: a network cannot ask the box for anything this way.
 
 mod discovery;
 mod layout;
@@ -30,6 +31,9 @@ use serde_json::{Value as Json, json};
 use std::collections::BTreeSet;
 use std::time::Duration;
 use tokio::time::Instant;
+
+/// Where the network tells facts. The items of facts that are taken stand on `PREFIX/fact`.
+const FACTS: &str = "fact/add";
 
 /// Where to, and how.
 #[derive(Debug, Clone, PartialEq)]
@@ -127,6 +131,17 @@ impl MqttSink {
         self.publish_messages(vec![answer], Qos::AtMostOnce).await
     }
 
+    /// Hands facts to the box and publishes what became of them.
+    async fn answer_facts(&mut self, message: &MqttMessage) -> Result<(), SinkError> {
+        let Some(Reply { done, text }) = self.requests.submit_facts(&message.payload, message.retained).await else {
+            return Ok(());
+        };
+        let says = json!({"done": done, "text": text});
+        let topic = self.format_topic("fact/answer");
+        let answer = Outgoing { topic, payload: says.to_string().into_bytes(), retain: false };
+        self.publish_messages(vec![answer], Qos::AtMostOnce).await
+    }
+
     /// Publishes which requests the machine has followed, and which it has not.
     async fn tell_outcomes(&mut self) -> Result<(), SinkError> {
         while let Some(outcome) = self.requests.next_outcome().map(format_outcome) {
@@ -139,7 +154,7 @@ impl MqttSink {
     }
 
     fn topic_prefix(&self) -> String {
-        let place = self.outbox.path().map(MachinePath::topic);
+        let place = self.outbox.path().map(MachinePath::format_topic);
         match (self.target.prefix.as_str(), self.target.layout) {
             ("", _) => place.unwrap_or_else(|| self.outbox.box_id()),
             (prefix, Layout::Uns) => place.map_or_else(|| prefix.to_owned(), |place| format!("{prefix}/{place}")),
@@ -154,7 +169,7 @@ impl MqttSink {
     fn build_online_message(&self, online: bool) -> Outgoing {
         let mut says = json!({"machine": self.outbox.machine(), "box": self.outbox.box_id(), "online": online});
         if let Some(path) = self.outbox.path() {
-            says["path"] = Json::from(path.topic());
+            says["path"] = Json::from(path.format_topic());
         }
         Outgoing { topic: self.format_topic("online"), payload: says.to_string().into_bytes(), retain: true }
     }
@@ -268,9 +283,11 @@ impl Sink for MqttSink {
             self.link.connect(&self.target.broker, &name, Some(will)).await?;
             self.request = None;
             self.described.clear();
-            if self.requests.is_allowed() {
-                let filter = vec![self.format_topic("request")];
-                self.link.subscribe_to(filter, Qos::AtLeastOnce, &self.target.broker).await?;
+            let heard = [(self.requests.is_allowed(), "request"), (self.requests.takes_facts(), FACTS)];
+            let filters: Vec<String> =
+                heard.iter().filter(|(is_heard, _)| *is_heard).map(|(_, kind)| self.format_topic(kind)).collect();
+            if !filters.is_empty() {
+                self.link.subscribe_to(filters, Qos::AtLeastOnce, &self.target.broker).await?;
             }
             self.publish_initial_state().await
         })
@@ -302,8 +319,10 @@ impl Sink for MqttSink {
     fn serve_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(async move {
             self.tell_latest().await?;
-            if let Some(message) = self.request.take().filter(|message| message.topic == self.format_topic("request")) {
-                self.answer_request(message).await?;
+            match self.request.take() {
+                Some(message) if message.topic == self.format_topic("request") => self.answer_request(message).await?,
+                Some(message) if message.topic == self.format_topic(FACTS) => self.answer_facts(&message).await?,
+                _ => {}
             }
             self.tell_outcomes().await
         })

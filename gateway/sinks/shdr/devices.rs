@@ -206,7 +206,7 @@ fn condition_item(prefix: &str, condition: &AlarmKind) -> String {
 #[must_use]
 pub fn prefix_of(path: Option<&MachinePath>, box_id: &str) -> String {
     match path {
-        Some(path) => format!("m_{}_", path.dotted()),
+        Some(path) => format!("m_{}_", path.format_dotted()),
         None => format!("m{}_", box_id.rsplit('-').next().unwrap_or_default()),
     }
 }

@@ -131,7 +131,7 @@ fn without_a_path_every_output_tells_what_it_told_before() {
     assert!(!flat.contains(&"path".to_owned()) && flat.contains(&"box".to_owned()), "{flat:?}");
     assert_eq!(
         told.topics[&format!("{id}/online")],
-        format!("{{\"box\":\"{id}\",\"machine\":\"Lathe 7\",\"online\":true}}")
+        format!("{{\"machine\":\"Lathe 7\",\"box\":\"{id}\",\"online\":true}}")
     );
     assert!(told.topics.contains_key("spBv1.0/plant/DDATA/line-1/lathe-7"), "{:?}", told.topics.keys());
     let subject = |kind: &str| format!("cnc.{id}.{kind}");

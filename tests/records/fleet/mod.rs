@@ -5,6 +5,7 @@
 
 mod boxes;
 mod identity;
+mod intake;
 mod killed;
 mod means;
 mod monitoring;

@@ -104,7 +104,12 @@ impl Recorded {
         let runtime =
             tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().expect("threads");
         let address = address.parse().expect("an address");
-        let sink = gateway::config::SinkConfig { name: "fleet".to_owned(), address, allow_requests: false };
+        let sink = gateway::config::SinkConfig {
+            name: "fleet".to_owned(),
+            address,
+            allow_requests: false,
+            allow_facts: false,
+        };
         let board = Board::new(outbox.clone(), [("fleet".to_owned(), "nats".to_owned())]);
         let (post, _inbox) = gateway::control::create_queues();
         let sinks = runtime.block_on(async { drive::start_sinks(&[sink], &post, (&outbox, &board), &path) });
