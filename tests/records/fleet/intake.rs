@@ -214,12 +214,17 @@ fn each_fact_is_once_in_history_fleet_and_figures_whatever_its_door() {
     assert!(run(&["history", "audit", "--verify", "--history", text(&database)]).status.success());
 
     plant.ingest();
+    figures_of_the_plant(&plant);
+}
+
+/// Each fact once in the database, and the figures that they make.
+fn figures_of_the_plant(plant: &Plant) {
     let sql = |statement: &str| plant.postgres.sql(statement);
     assert_eq!(sql("SELECT count(*), count(DISTINCT mark) FROM fact_list"), "8|8");
     assert_eq!(sql("SELECT DISTINCT path FROM facts"), PATH);
     assert_eq!(sql("SELECT count(*) FROM refused"), "0");
     // An hour may lie in two shifts: their sums are those of the hour.
-    let shifts: Vec<_> = ask(&plant, "oee-per-shift").into_iter().filter(|row| row[0] == PATH).collect();
+    let shifts: Vec<_> = ask(plant, "oee-per-shift").into_iter().filter(|row| row[0] == PATH).collect();
     let sum = |column: usize| shifts.iter().map(|row| number(&row[column])).sum::<f64>();
     let (parts, scrap, planned_h) = (sum(3), sum(9), sum(10));
     assert!((parts - 4.0).abs() < 1.5 && scrap == 2.0 && (planned_h - 0.5).abs() < 1e-9, "{shifts:?}");
@@ -230,14 +235,14 @@ fn each_fact_is_once_in_history_fleet_and_figures_whatever_its_door() {
         let oee = number(&row[4]) * number(&row[5]) * number(&row[8]);
         assert!((number(&row[6]) - oee).abs() < 1e-9, "{row:?}");
     }
-    let orders = ask(&plant, "energy-per-order");
+    let orders = ask(plant, "energy-per-order");
     assert_eq!(orders.len(), 1, "{orders:?}");
     assert_eq!(
         (&*orders[0][0], &*orders[0][1], &*orders[0][4], &*orders[0][5], &*orders[0][6]),
         (PATH, "A-4711", "10", "4", "2")
     );
     assert_eq!((number(&orders[0][7]), number(&orders[0][8])), (1.0, 500.0), "4 parts of 250 Wh, 2 of them good");
-    let stops = ask(&plant, "stops-by-reason");
+    let stops = ask(plant, "stops-by-reason");
     assert_eq!((&*stops[0][1], &*stops[0][2]), ("no material", "1"));
     assert!((number(&stops[0][3]) * 3600.0 - 100.0).abs() < 1e-6, "{stops:?}");
 }
