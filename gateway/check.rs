@@ -193,7 +193,7 @@ fn check_thermal(config: &Config, report: &mut CheckReport) {
     let name = path.display().to_string();
     let read = std::fs::read_to_string(path)
         .map_err(|error| format!("the thermal law cannot be read: {error}"))
-        .and_then(|text| ThermalModel::read(&text, &config.gateway.name));
+        .and_then(|text| ThermalModel::read(&text, &config.gateway.machine.name));
     match read {
         Ok(model) => report.read.push(format!("{name}: a thermal law of {} terms", model.law.terms.len())),
         Err(what) => {
@@ -212,15 +212,17 @@ fn check_sinks(name: &str, config: &Config, report: &mut CheckReport) {
                 .read
                 .push(format!("{name}: sends to {}; `cnc-gateway doctor` with this address connects", sink.address));
         }
-        if sink.allow_requests {
-            let line = match sink.address.is_secured() {
-                true => "whoever may publish there",
-                false => "whoever reaches the line, which is not encrypted,",
-            };
-            report.read.push(format!(
-                "{name}: sink {} takes requests: {line} may ask the gate for a slower feed and acknowledge alarms",
-                sink.name
-            ));
+        let line = match sink.address.is_secured() {
+            true => "whoever may publish there",
+            false => "whoever reaches the line, which is not encrypted,",
+        };
+        for (allowed, what, may) in [
+            (sink.allow_requests, "requests", "ask the gate for a slower feed and acknowledge alarms"),
+            (sink.allow_facts, "facts", "tell orders, scrap, reasons of stops, persons and planned time"),
+        ] {
+            if allowed {
+                report.read.push(format!("{name}: sink {} takes {what}: {line} may {may}", sink.name));
+            }
         }
         let problem = |(what, next)| Problem::in_file(name, format!("sink {}: {what}", sink.name), next);
         report.problems.extend(problems.into_iter().map(problem));

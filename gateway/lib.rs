@@ -37,7 +37,7 @@ pub use gateway_access as access;
 pub use gateway_backtest as backtest;
 pub use gateway_backup as backup;
 pub use gateway_backup::archive;
-pub use gateway_base::{cannot_run, clock, convert, files, log, moment, state_file, usage};
+pub use gateway_base::{cannot_run, clock, convert, files, log, machine_path, moment, state_file, usage};
 pub use gateway_commission as commission;
 pub use gateway_commission::{identification, pulses};
 pub use gateway_config as config;

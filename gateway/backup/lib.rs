@@ -66,7 +66,7 @@ impl BackupPaths {
     #[must_use]
     pub fn from_config(config: &gateway_config::Config, file: Option<&Path>) -> Self {
         Self {
-            machine: config.gateway.name.clone(),
+            machine: config.gateway.machine.name.clone(),
             data_dir: config.gateway.data_dir.clone(),
             scripts: config.scripts.directory.clone(),
             history: config.history.path.clone(),

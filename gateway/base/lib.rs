@@ -6,6 +6,7 @@ pub mod convert;
 pub mod files;
 pub mod limits;
 pub mod log;
+pub mod machine_path;
 pub mod moment;
 pub mod owner;
 pub mod problem;

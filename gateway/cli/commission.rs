@@ -87,12 +87,12 @@ pub(super) fn run(arguments: &CommissionArguments) -> CommandResult {
         .transpose()
         .map_err(CannotRun::from_error)?;
     let (recording, merged) = prepare_recording(&config.history.path, &noted, from).map_err(CannotRun::from_error)?;
-    let learned = learn_parts(&recording, merged, &config.gateway.name, arguments.criterion_mm);
+    let learned = learn_parts(&recording, merged, &config.gateway.machine.name, arguments.criterion_mm);
     let written = if arguments.write { write(&config, &learned)? } else { Vec::new() };
     let text = describe_learned(&learned, &noted, &written, (from.unwrap_or(first_ns), newest_ns));
     if arguments.write {
         let path = config.gateway.data_dir.join("commission.html");
-        write_output(&path, &render_page(&config.gateway.name, &text, &learned.pictures))
+        write_output(&path, &render_page(&config.gateway.machine.name, &text, &learned.pictures))
             .map_err(CannotRun::from_error)?;
     }
     let document = learned_to_json(&learned, &written, (from.unwrap_or(first_ns), newest_ns));

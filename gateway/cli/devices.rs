@@ -5,6 +5,7 @@ use crate::history::{Query, Reader, box_id};
 use crate::sinks::shdr::{Described, devices_xml, is_prefix, prefix_of};
 use crate::{clock, config, moment};
 use clap::Args;
+use gateway_base::machine_path::MachinePath;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -16,7 +17,7 @@ pub(super) struct DevicesArguments {
     /// Write it there instead of printing it.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// What every identifier begins with, so that several machines can stand in one agent; default: the digits of the box.
+    /// What every identifier begins with, so that several machines can stand in one agent; default: the path of the machine, or the digits of the box.
     #[arg(long, value_name = "TEXT")]
     prefix: Option<String>,
     /// The file that this command wrote for another machine, which stands in the same agent; can be given several times.
@@ -34,20 +35,22 @@ pub(super) fn run(arguments: &DevicesArguments) -> CommandResult {
         CannotRun::new(lines.join("\n"), "")
     })?;
     let path = &config.history.path;
-    let box_id = box_id(path, &config.gateway.name)
+    let machine = &config.gateway.machine;
+    let box_id = box_id(path, &machine.name)
         .map_err(|error| CannotRun::new(format!("the history gives the machine no identity: {error}"), ""))?;
-    let prefix = arguments.prefix.clone().unwrap_or_else(|| prefix_of(&box_id));
+    let prefix = arguments.prefix.clone().unwrap_or_else(|| prefix_of(machine.path.as_ref(), &box_id));
     if !is_prefix(&prefix) {
         return Err(CannotRun::new(
             format!("{prefix:?} is no beginning of an identifier"),
             "write a letter, then letters, digits and _",
         ));
     }
+    let device = machine.path.as_ref().map_or(box_id, MachinePath::format_dotted);
     let delivered = read_delivered_channels(path);
     let created = moment::format_utc(clock::now_ns());
     let known = |channel: &str| delivered.as_ref().is_none_or(|names| names.contains(channel));
     let others = arguments.others.iter().map(|file| read(file)).collect::<Result<Vec<_>, _>>()?;
-    let described = Described { machine: &config.gateway.name, box_id: &box_id, prefix: &prefix };
+    let described = Described { machine: &machine.name, device: &device, prefix: &prefix };
     let text = devices_xml(described, &created, known, &others).map_err(CannotRun::from_error)?;
     match &arguments.out {
         None => print_text(&text),

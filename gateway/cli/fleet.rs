@@ -60,7 +60,7 @@ pub(super) struct RetainArguments {
     /// Means of hours and days.
     #[arg(long, default_value_t = KEEPING[2].days, value_name = "DAYS")]
     hours_d: u32,
-    /// States, parts, operations, events, diagnoses and gaps.
+    /// States, parts, operations, events, diagnoses, gaps and facts.
     #[arg(long, default_value_t = KEEPING[3].days, value_name = "DAYS")]
     records_d: u32,
     /// Alarms and decisions.

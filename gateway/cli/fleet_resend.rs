@@ -56,8 +56,8 @@ impl ResendArguments {
         if !(self.rate > 0.0 && self.rate <= 1e6) {
             return Err(CannotRun::new("--rate is out of range", "give a number of items a second above 0"));
         }
-        let name = box_id(&config.history.path, &config.gateway.name).map_err(to_cannot_run)?;
-        let outbox = Outbox::of_box(&config.gateway.name, config.outbox.clone(), &name);
+        let name = box_id(&config.history.path, &config.gateway.machine.name).map_err(to_cannot_run)?;
+        let outbox = Outbox::of_box(config.gateway.machine.clone(), config.outbox.clone(), &name);
         let resender = Resender::new(&sink.address, &sink.name, &outbox, self.rate).ok_or_else(|| {
             let what = format!("the sink {} cannot take old data beside new", sink.name);
             CannotRun::new(what, "name a sink whose address begins with mqtt://, mqtts://, nats:// or natss://")

@@ -4,6 +4,7 @@ use super::keys::{ConfigKey, NAME_MAX, ValueKind};
 use adapters::Address;
 use adapters::address::AddressError;
 use adapters::channel::find_nearest_name;
+use gateway_base::machine_path::{MachinePath, MachinePathError};
 use gateway_sinks::SinkAddress;
 use toml::de::DeValue;
 
@@ -56,6 +57,8 @@ fn describe_kind(kind: ValueKind) -> &'static str {
         ValueKind::Path => "a path in quotes",
         ValueKind::Listen => "HOST:PORT in quotes",
         ValueKind::Address | ValueKind::SinkAddress => "an address in quotes",
+        ValueKind::PlantPath => "a path in quotes",
+        ValueKind::PathWord => "a word in quotes",
     }
 }
 
@@ -68,6 +71,8 @@ fn format_example(key: &ConfigKey) -> String {
         ValueKind::Listen => "\"127.0.0.1:8080\"".to_owned(),
         ValueKind::Address => "\"simulated://lathe\"".to_owned(),
         ValueKind::SinkAddress => "\"mqtts://broker:8883/plant\"".to_owned(),
+        ValueKind::PlantPath => "\"shanghai/line-2\"".to_owned(),
+        ValueKind::PathWord => "\"lathe-7\"".to_owned(),
     };
     format!("for example {} = {value}", key.name)
 }
@@ -91,7 +96,17 @@ pub(super) fn check_scalar(key: &ConfigKey, text: &str) -> Result<Scalar, ValueR
             let what = format!("`{}` has {} letters", key.name, text.chars().count());
             Err((what, format!("give a name of at most {NAME_MAX}")))
         }
+        ValueKind::PlantPath => check_path(key, text, MachinePath::new(text, "machine").err()),
+        ValueKind::PathWord => check_path(key, text, MachinePath::new("site", text).err()),
         ValueKind::Text | ValueKind::Name | ValueKind::Path => Ok(Scalar::Text(text.to_owned())),
+    }
+}
+
+/// Every output carries the words of a path as they are.
+fn check_path(key: &ConfigKey, text: &str, wrong: Option<MachinePathError>) -> Result<Scalar, ValueRefusal> {
+    match wrong {
+        None => Ok(Scalar::Text(text.to_owned())),
+        Some(error) => Err((format!("`{} = {text:?}` cannot be used: {error}", key.name), format_example(key))),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::keys::Absent::{self, Default, Optional, Required};
 use super::keys::{ConfigKey, KEYS, NAME_MAX, SECTIONS, ValueKind, find_section, keys_of};
+use gateway_base::machine_path::WORD_FORM;
 
 impl ValueKind {
     /// What is accepted, as a reader of the table needs it.
@@ -16,6 +17,8 @@ impl ValueKind {
             Self::Path => "path".to_string(),
             Self::Listen => "HOST:PORT".to_string(),
             Self::Address | Self::SinkAddress => "address".to_string(),
+            Self::PlantPath => format!("1 to 4 words with / between, each {WORD_FORM}"),
+            Self::PathWord => WORD_FORM.to_string(),
         }
     }
 }

@@ -31,6 +31,10 @@ pub enum ValueKind {
     Address,
     /// The address of a sink.
     SinkAddress,
+    /// The levels of the plant before the machine, with slashes between them.
+    PlantPath,
+    /// One word of such a path.
+    PathWord,
 }
 
 /// What happens when a key is not written.
@@ -116,7 +120,7 @@ pub(super) const fn new_key(
 }
 
 use Absent::{Default, Optional, Required};
-use ValueKind::{Address, Flag, Listen, Name, Number, OneOf, Path, Text};
+use ValueKind::{Address, Flag, Listen, Name, Number, OneOf, Path, PathWord, PlantPath, Text};
 
 /// Every key the gateway knows.
 pub static KEYS: &[ConfigKey] = &ALL;
@@ -148,6 +152,20 @@ const CORE: &[ConfigKey] = &[
         Default("\"cnc-gateway\""),
         "Name of the machine on the page and in exports",
         "机床名称",
+    ),
+    new_key(
+        ("gateway", "path"),
+        PlantPath,
+        Optional,
+        "Where the machine stands: SITE, SITE/LINE, SITE/AREA/LINE or ENTERPRISE/SITE/AREA/LINE. Outputs and fleet know the machine by it, whichever box stands there",
+        "机床在工厂中的位置：各输出和机群数据库以此识别机床，更换网关盒不影响机床",
+    ),
+    new_key(
+        ("gateway", "machine"),
+        PathWord,
+        Optional,
+        "Word of the machine at the end of the path; default: the name, with - for blanks",
+        "路径末尾的机床代号；默认为名称，空格写作 -",
     ),
     new_key(
         ("gateway", "tick_hz"),

@@ -28,6 +28,13 @@ pub(super) const OUTPUTS: &[ConfigKey] = &[
         "允许网络向闸门提出请求",
     ),
     new_key(
+        ("sink", "allow_facts"),
+        Flag,
+        Default("false"),
+        "Computers on the network of an mqtt sink may tell orders, scrap, reasons of stops, persons and planned time on PREFIX/fact/add",
+        "允许网络在 PREFIX/fact/add 上告知订单、废品、停机原因、人员和计划时间",
+    ),
+    new_key(
         ("sinks", "drain_s"),
         Number(0.0, 60.0),
         Default("5.0"),

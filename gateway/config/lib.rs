@@ -26,6 +26,7 @@ pub use problem::Problem;
 
 use adapters::{Address, Axis, ChannelId};
 use gateway_base::log::LogFormat;
+use gateway_base::machine_path::NamedMachine;
 pub use gateway_gate::limits::{GateConfig, GateMode, OffsetConfig};
 use gateway_history::OutboxSettings;
 pub use gateway_sinks::sink_config::SinkConfig;
@@ -83,8 +84,8 @@ pub struct Config {
 /// The section `[gateway]`: the box itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GatewayConfig {
-    /// Name of the machine.
-    pub name: String,
+    /// Name of the machine, and its path in the plant.
+    pub machine: NamedMachine,
     /// Ticks per second, 0.1 to 1000.
     pub tick_hz: f64,
     /// A reading of the wall clock that has stood for so long is believed.

@@ -12,7 +12,11 @@ use std::time::Duration;
 /// The sinks; names that are there twice are reported.
 pub(super) fn build_sinks(reading: &mut ConfigInput<'_>) -> Option<Vec<SinkConfig>> {
     let sinks: Option<Vec<SinkConfig>> = reading.sinks.iter().map(build_sink).collect();
-    requests_need_a_way_in(reading);
+    needs_a_way_in(reading, "allow_requests", ("nothing can be asked for", "mqtts:// or sparkplugs://"), |address| {
+        address.can_receive_requests()
+    });
+    needs_a_way_in(reading, "allow_facts", ("no facts can be told", "mqtts://"), SinkAddress::can_receive_facts);
+    places_need_a_path(reading);
     let names: Vec<Option<String>> = reading.sinks.iter().map(source_name).collect();
     for (index, name) in names.iter().enumerate().filter(|(_, name)| name.is_some()) {
         if names[..index].contains(name) {
@@ -26,24 +30,51 @@ pub(super) fn build_sinks(reading: &mut ConfigInput<'_>) -> Option<Vec<SinkConfi
 
 fn build_sink(values: &SectionValues) -> Option<SinkConfig> {
     let address = values.found.get("address").and_then(as_text)?.parse().ok()?;
-    Some(SinkConfig { name: source_name(values)?, address, allow_requests: allows_requests(values) })
+    let allows = |key| allows(values, key);
+    Some(SinkConfig {
+        name: source_name(values)?,
+        address,
+        allow_requests: allows("allow_requests"),
+        allow_facts: allows("allow_facts"),
+    })
 }
 
-fn allows_requests(values: &SectionValues) -> bool {
-    values.found.get("allow_requests").is_some_and(|found| found.value == Scalar::Flag(true))
+fn allows(values: &SectionValues, key: &str) -> bool {
+    values.found.get(key).is_some_and(|found| found.value == Scalar::Flag(true))
 }
 
-/// Only through a broker can the network ask for something.
-fn requests_need_a_way_in(reading: &mut ConfigInput<'_>) {
+/// Only through a broker can the network ask for something, or tell it. `words` say what cannot be done, and through which addresses it can.
+fn needs_a_way_in(
+    reading: &mut ConfigInput<'_>,
+    key: &str,
+    (what, schemes): (&str, &str),
+    has_one: impl Fn(&SinkAddress) -> bool,
+) {
     let origin = |values: &SectionValues| {
         let address: SinkAddress = values.found.get("address").and_then(as_text)?.parse().ok()?;
-        let deaf = allows_requests(values) && !address.can_receive_requests();
-        values.found.get("allow_requests").filter(|_| deaf).map(|found| (found.origin.clone(), address))
+        let deaf = allows(values, key) && !has_one(&address);
+        values.found.get(key).filter(|_| deaf).map(|found| (found.origin.clone(), address))
     };
     let deaf: Vec<_> = reading.sinks.iter().filter_map(origin).collect();
     for (origin, address) in deaf {
-        let what = format!("`allow_requests = true`, but nothing can be asked for through {}:", address.scheme());
-        reading.add_problem(&origin, what, "leave it out, or use an mqtts:// or sparkplugs:// sink");
+        let what = format!("`{key} = true`, but {what} through {}:", address.scheme());
+        reading.add_problem(&origin, what, format!("leave it out, or use an {schemes} sink"));
+    }
+}
+
+/// A sink whose address leaves the place of the machine to its path needs one.
+fn places_need_a_path(reading: &mut ConfigInput<'_>) {
+    if find_text(reading, "gateway", "path").is_some() {
+        return;
+    }
+    let missing = |values: &SectionValues| {
+        let found = values.found.get("address")?;
+        let address: SinkAddress = as_text(found)?.parse().ok()?;
+        Some((found.origin.clone(), address.find_need_of_path()?))
+    };
+    let missing: Vec<_> = reading.sinks.iter().filter_map(missing).collect();
+    for (origin, (what, next)) in missing {
+        reading.add_problem(&origin, what, next);
     }
 }
 

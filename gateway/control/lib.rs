@@ -15,19 +15,24 @@
 //! |---|---|
 //! | `server` | listens, checks, hands each order to the tick and answers with what the tick says |
 //! | `order_channel` | the way to the tick and back, for the socket, for the page and for the sinks |
+//! | `fact` | facts of production that the plant adds, from every door; no order |
 //! | `network` | the little that a computer on the network may ask for over a sink; no order |
 //! | `outcome` | what became of that in the end, on its way back to the sink |
 //! | `client` | `cnc-gateway arm`, `disarm`, `acknowledge` |
 
 mod client;
+mod fact;
 mod network;
 mod order_channel;
 mod outcome;
 mod server;
 
 pub use client::send_order;
+pub use fact::{FACTS_MAX, FactDocument, FactError, FactSender, FactsError, read_facts_csv, read_facts_json};
 pub use network::{NetworkRequest, RequestOrigin, RequestRefusal, RequestedChange};
-pub use order_channel::{OrderReceiver, OrderSender, PostedRequest, PostedRow, Wake, create_queues};
+pub use order_channel::{
+    FactsRefused, FactsTaken, OrderReceiver, OrderSender, PostedFacts, PostedRequest, PostedRow, Wake, create_queues,
+};
 pub use outcome::{Ending, OUTCOMES_MAX, OutcomeSender, RequestOutcome};
 pub use server::{Listening, listen_for_orders};
 

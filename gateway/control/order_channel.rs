@@ -7,12 +7,13 @@ use super::{
     ANSWER_WITHIN, Ending, NetworkRequest, Order, OutcomeSender, QueuedOrder, Reply, RequestOutcome, WAITING_MAX,
 };
 use gateway_base::clock;
-use gateway_history::Audit;
+use gateway_history::{Audit, Fact};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, OnceLock};
 use std::thread::Thread;
 use std::time::Duration;
+use thiserror::Error;
 use tokio::sync::oneshot;
 
 /// Rows that wait for the tick.
@@ -21,6 +22,8 @@ const ROWS_MAX: usize = 64;
 const ACCOUNT_WITHIN: Duration = Duration::from_secs(3);
 /// Requests of the network that wait for the tick.
 const REQUESTS_MAX: usize = 16;
+/// Messages of facts that wait for the tick.
+const FACTS_WAITING_MAX: usize = 16;
 
 /// Wakes the tick's thread while it waits for the next tick.
 #[derive(Debug, Clone, Default)]
@@ -71,12 +74,45 @@ pub struct PostedRequest {
     pub outcomes: OutcomeSender,
 }
 
+/// The facts of one message on their way, with the way back.
+#[derive(Debug)]
+pub struct PostedFacts {
+    /// What the plant tells, checked.
+    pub facts: Vec<Fact>,
+    /// Where the answer goes.
+    pub reply: oneshot::Sender<Result<FactsTaken, FactsRefused>>,
+}
+
+/// What became of the facts of one message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct FactsTaken {
+    /// So many are stored now.
+    pub new: usize,
+    /// So many were there already, by their marks.
+    pub known: usize,
+}
+
+/// Why none of the facts was taken. The same message may be sent again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum FactsRefused {
+    /// What is not stored is not taken.
+    #[error("the history stores nothing at present; look at the problems of the box and send them again")]
+    NotStored,
+    /// The tick has other facts to take.
+    #[error("too many facts wait for the box; send them again in a moment")]
+    Busy,
+    /// The tick does not live.
+    #[error("the tick does not answer; look at the log of the box and send them again")]
+    NoAnswer,
+}
+
 /// The end of those who order.
 #[derive(Debug, Clone)]
 pub struct OrderSender {
     orders: SyncSender<QueuedOrder>,
     rows: SyncSender<PostedRow>,
     requests: SyncSender<PostedRequest>,
+    facts: SyncSender<PostedFacts>,
     wake: Wake,
 }
 
@@ -89,6 +125,8 @@ pub struct OrderReceiver {
     pub rows: Receiver<PostedRow>,
     /// What the network asks for.
     pub requests: Receiver<PostedRequest>,
+    /// What the plant adds.
+    pub facts: Receiver<PostedFacts>,
     /// How the tick is woken.
     pub wake: Wake,
 }
@@ -99,9 +137,10 @@ pub fn create_queues() -> (OrderSender, OrderReceiver) {
     let (orders, to_obey) = sync_channel(WAITING_MAX);
     let (rows, to_keep) = sync_channel(ROWS_MAX);
     let (requests, to_judge) = sync_channel(REQUESTS_MAX);
+    let (facts, to_store) = sync_channel(FACTS_WAITING_MAX);
     let wake = Wake::default();
-    let post = OrderSender { orders, rows, requests, wake: wake.clone() };
-    (post, OrderReceiver { orders: to_obey, rows: to_keep, requests: to_judge, wake })
+    let post = OrderSender { orders, rows, requests, facts, wake: wake.clone() };
+    (post, OrderReceiver { orders: to_obey, rows: to_keep, requests: to_judge, facts: to_store, wake })
 }
 
 impl OrderSender {
@@ -131,6 +170,20 @@ impl OrderSender {
         match tokio::time::timeout(ACCOUNT_WITHIN, answered).await {
             Ok(Ok(reply)) => reply,
             _ => Reply::from_refusal("the tick does not answer; look at the log of the box"),
+        }
+    }
+
+    /// Hands the facts of one message to the tick: all are taken, or none.
+    ///
+    /// # Errors
+    /// Why none was taken.
+    pub async fn send_facts(&self, facts: Vec<Fact>) -> Result<FactsTaken, FactsRefused> {
+        let (reply, answered) = oneshot::channel();
+        self.facts.try_send(PostedFacts { facts, reply }).map_err(|_full| FactsRefused::Busy)?;
+        self.wake.wake_thread();
+        match tokio::time::timeout(ACCOUNT_WITHIN, answered).await {
+            Ok(Ok(answer)) => answer,
+            _ => Err(FactsRefused::NoAnswer),
         }
     }
 

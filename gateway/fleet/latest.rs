@@ -82,6 +82,7 @@ mod tests {
         let row = |at_ns: i64, number: f64, historical: bool| FleetRow {
             box_name: "b".into(),
             machine: "m".into(),
+            path: None,
             sequence: at_ns,
             epoch: 1,
             redated_ns: 0,

@@ -1,18 +1,21 @@
-//! The numbers that boxes and series have in the database.
+//! The numbers that boxes and series have in the database, and at which machine each box stands.
 
 use super::database::DatabaseError;
 use super::row::SeriesName;
 use super::write::Arrived;
+use gateway_base::machine_path::MachinePath;
 use std::collections::HashMap;
 use tokio_postgres::Client;
+use tokio_postgres::types::ToSql;
 
 /// Names that are remembered; beyond that they are asked for again. A thousand boxes of a hundred series each.
 const REMEMBERED_MAX: usize = 100_000;
 
 #[derive(Debug, Default)]
 pub(super) struct Names {
-    /// Number and name of the machine.
     boxes: HashMap<String, (i32, String)>,
+    /// At which machine each box was last noted.
+    places: HashMap<String, Option<MachinePath>>,
     /// By name, then by unit: few names have several.
     series: HashMap<String, Vec<(String, i32)>>,
 }
@@ -44,6 +47,12 @@ impl Names {
                     .map_err(naming)?;
                 self.boxes.insert(row.box_name.to_string(), (found.get(0), row.machine.to_string()));
             }
+            // What comes late was made at a time of which the box does not say where it stood.
+            if !row.historical && self.places.get(&*row.box_name) != Some(&row.path) {
+                let box_id = self.box_id(&row.box_name);
+                note_place(client, box_id, row.path.as_ref(), row.at_us()).await.map_err(naming)?;
+                self.places.insert(row.box_name.to_string(), row.path.clone());
+            }
             for series in row.series_names() {
                 if self.series_id(series).is_none() {
                     let found =
@@ -56,6 +65,38 @@ impl Names {
         Ok(())
     }
 }
+
+/// Notes at which machine a box stands from this time on, where that is another one than before.
+async fn note_place(
+    client: &Client,
+    box_id: Option<i32>,
+    path: Option<&MachinePath>,
+    at_us: i64,
+) -> Result<(), tokio_postgres::Error> {
+    let machine_id: Option<i32> = match path {
+        None => None,
+        Some(path) => {
+            let level =
+                |name: &str| path.list_levels().find(|(level, _)| *level == name).map(|(_, word)| word.to_owned());
+            let [enterprise, site, area, line] = ["enterprise", "site", "area", "line"].map(level);
+            let values: [&(dyn ToSql + Sync); 6] =
+                [&path.format_topic(), &enterprise, &site, &area, &line, &path.machine_word()];
+            Some(client.query_one(NAME_MACHINE, &values).await?.get(0))
+        }
+    };
+    client.execute(PLACE_BOX, &[&box_id, &at_us, &machine_id]).await.map(drop)
+}
+
+const NAME_MACHINE: &str = "
+INSERT INTO machines (path, enterprise, site, area, line, machine) VALUES ($1, $2, $3, $4, $5, $6)
+ON CONFLICT (path) DO UPDATE SET path = excluded.path RETURNING machine_id";
+
+/// A box that has never had a path has no row; one whose path was taken away has one without a machine.
+const PLACE_BOX: &str = "
+INSERT INTO box_machines (box_id, since, machine_id)
+SELECT $1, fleet_time($2::bigint * 1000), $3
+WHERE (SELECT machine_id FROM box_machines WHERE box_id = $1 AND since <= fleet_time($2::bigint * 1000) ORDER BY since DESC LIMIT 1) IS DISTINCT FROM $3::int
+ON CONFLICT (box_id, since) DO UPDATE SET machine_id = excluded.machine_id";
 
 /// A name counts from the time of the item that brings it; an item that comes late does not bring the old one back.
 const NAME_BOX: &str = "

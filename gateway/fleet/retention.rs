@@ -38,9 +38,10 @@ pub const KEEPING: [Keeping; 6] = [
             ("event_list", "at"),
             ("diagnosis_list", "at"),
             ("gap_list", "since"),
+            ("fact_list", "at"),
         ],
         days: 1830,
-        what: "states, parts, operations, events, diagnoses and gaps",
+        what: "states, parts, operations, events, diagnoses, gaps and facts",
     },
     Keeping {
         option: "alarms-d",

@@ -1,6 +1,7 @@
 //! A message of the stream as a row. Pure.
 
 use adapters::clock::TimeNs;
+use gateway_base::machine_path::MachinePath;
 use gateway_history::{NOT_RUNNING, parse_nested_json};
 use serde::Deserialize;
 use serde_json::Value as Json;
@@ -25,6 +26,8 @@ const TIMES: [&str; 6] = ["at_ns", "began_ns", "ended_ns", "from_ns", "to_ns", "
 pub(super) struct FleetRow<'a> {
     pub(super) box_name: Cow<'a, str>,
     pub(super) machine: Cow<'a, str>,
+    /// Where the machine stands, as its box says; `None`: the machine is its box.
+    pub(super) path: Option<MachinePath>,
     /// From 1 to the greatest `i64`.
     pub(super) sequence: i64,
     /// Which life of the box has numbered it; 0 for boxes of before.
@@ -74,6 +77,8 @@ struct ItemDocument<'a> {
     machine: Cow<'a, str>,
     #[serde(rename = "box", borrow)]
     box_name: Cow<'a, str>,
+    #[serde(default, borrow)]
+    path: Option<Cow<'a, str>>,
     historical: bool,
 }
 
@@ -123,6 +128,19 @@ fn check_name<'a>(what: &str, name: Cow<'a, str>) -> Result<Cow<'a, str>, Refuse
     }
 }
 
+/// A machine that has a path sends under it: `PATH.BOX.KIND`. So the rights of the servers over subjects hold for machines, too.
+fn check_path(path: Option<&str>, subject: &str, box_name: &str) -> Result<Option<MachinePath>, RefusedMessage> {
+    let Some(text) = path else { return Ok(None) };
+    let path: MachinePath =
+        text.parse().map_err(|error| RefusedMessage(format!("the path of the machine cannot be used: {error}")))?;
+    let place = subject.rsplit_once('.').and_then(|(before, _kind)| before.strip_suffix(box_name));
+    let expected = format!(".{}.", path.format_dotted());
+    match place.is_some_and(|place| place.ends_with(&expected)) {
+        true => Ok(Some(path)),
+        false => refuse_message("the subject belongs to another machine than the path in the document says"),
+    }
+}
+
 /// PostgreSQL has no NUL in texts.
 fn clean_text(text: Cow<'_, str>) -> Cow<'_, str> {
     match text.contains('\0') || text.len() > TEXT_MAX {
@@ -163,6 +181,7 @@ impl<'a> FleetRow<'a> {
         if ends.next() != Some(&document.kind) || ends.next() != Some(&document.box_name) {
             return refuse_message("the subject belongs to another box or kind than the document says");
         }
+        let path = check_path(document.path.as_deref(), subject, &document.box_name)?;
         let sequence = match i64::try_from(document.sequence) {
             Ok(sequence) if sequence > 0 => sequence,
             _ => return refuse_message("the number of the item is out of range"),
@@ -181,6 +200,7 @@ impl<'a> FleetRow<'a> {
         let mut row = Self {
             box_name: check_name("box", document.box_name)?,
             machine: check_name("machine", document.machine)?,
+            path,
             sequence,
             epoch,
             redated_ns: document.redated_ns,
@@ -219,6 +239,10 @@ impl<'a> FleetRow<'a> {
     /// Its time is so much later: the clock of the box had been wrong when it was sent. Means are of other minutes then, and the box tells
     /// those anew; a gap before the first sample of a run begins with the run before.
     pub(super) fn shift_time(&mut self, by_ns: i64) {
+        // The times of a fact are those of whoever told it.
+        if self.kind == "fact" {
+            return;
+        }
         self.redated_ns = self.redated_ns.saturating_add(by_ns);
         if !self.means.is_empty() {
             self.means.clear();
@@ -297,6 +321,24 @@ mod tests {
                 .0
                 .contains("no document")
         );
+    }
+
+    #[test]
+    fn a_machine_with_a_path_sends_under_it() {
+        let mut document = sample();
+        document["path"] = json!("shanghai/line-2/lathe-7");
+        let payload = document.to_string();
+        let read = |subject: &str| FleetRow::from_message(subject, payload.as_bytes()).map(|row| row.path);
+        let path = "shanghai/line-2/lathe-7".parse().expect("a path");
+        assert_eq!(read("cnc.shanghai.line-2.lathe-7.Lathe-7-3fa9c1.sample"), Ok(Some(path)));
+        for other in
+            [SUBJECT, "cnc.shanghai.line-2.lathe-8.Lathe-7-3fa9c1.sample", "cnc.line-2.lathe-7.Lathe-7-3fa9c1.sample"]
+        {
+            assert!(read(other).expect_err("refused").0.contains("another machine"), "{other}");
+        }
+        document["path"] = json!("lathe 7");
+        let payload = document.to_string();
+        assert!(FleetRow::from_message(SUBJECT, payload.as_bytes()).expect_err("refused").0.contains("cannot be used"));
     }
 
     #[test]

@@ -8,9 +8,14 @@ use std::collections::BTreeSet;
 use tokio_postgres::{Client, Transaction};
 
 /// The version of the tables that this program writes.
-const VERSION: i32 = 3;
+const VERSION: i32 = 5;
 /// The statements that create the tables of the fleet database.
-pub const TABLES: &str = concat!(include_str!("schema/tables.sql"), include_str!("schema/clock_moves.sql"));
+pub const TABLES: &str = concat!(
+    include_str!("schema/tables.sql"),
+    include_str!("schema/clock_moves.sql"),
+    include_str!("schema/machines.sql"),
+    include_str!("schema/facts.sql")
+);
 /// The views and functions.
 pub const VIEWS: &str = include_str!("schema/views.sql");
 /// Settings of the database, at every start: one that was made by an earlier version has them, too.
@@ -20,8 +25,11 @@ pub(super) const RECORDS: &str = include_str!("schema/records.sql");
 /// From version 1: what makes room for the new tables, and what fills them.
 const FROM_1: [&str; 2] = [include_str!("schema/migrate_1.sql"), include_str!("schema/migrate_1_rows.sql")];
 
-/// From version 2: epochs of items, and times that move.
-const FROM_2: &str = include_str!("schema/migrate_2.sql");
+/// From each version on, what it lacks of the next one. From version 2: epochs of items, and times that move. From version 3: machines
+/// beside their boxes. From version 4: facts of production.
+const FROM_2: &str = concat!(include_str!("schema/migrate_2.sql"), include_str!("schema/clock_moves.sql"));
+const FROM_3: &str = include_str!("schema/machines.sql");
+const FROM_4: &str = include_str!("schema/facts.sql");
 /// Items of a wrong clock: which move, and, after their partitions are there, everything made of them.
 pub(super) const REDATE: [&str; 2] = [include_str!("schema/redate.sql"), include_str!("schema/redate_rows.sql")];
 
@@ -169,7 +177,9 @@ pub(super) async fn bring_up(client: &mut Client) -> Result<Partitioning, NatsEr
     match read_version(&transaction).await? {
         0 => create_tables(&transaction, partitioning).await?,
         1 => from_1(&transaction, partitioning).await?,
-        2 => from_2(&transaction).await?,
+        2 => change_tables(&transaction, 2, &[FROM_2, FROM_3, FROM_4]).await?,
+        3 => change_tables(&transaction, 3, &[FROM_3, FROM_4]).await?,
+        4 => change_tables(&transaction, 4, &[FROM_4]).await?,
         VERSION => {}
         newer => {
             let what = format!("the tables have version {newer}, this program knows {VERSION}");
@@ -238,11 +248,11 @@ async fn from_1(transaction: &Transaction<'_>, partitioning: Partitioning) -> Re
     transaction.batch_execute(&text).await.map_err(moving)
 }
 
-async fn from_2(transaction: &Transaction<'_>) -> Result<(), NatsError> {
-    tell_move(2);
-    let moves = include_str!("schema/clock_moves.sql");
-    let text = format!("{FROM_2}{moves}{VIEWS}\nINSERT INTO fleet_schema (version) VALUES ({VERSION});");
-    transaction.batch_execute(&text).await.map_err(to_nats_error("bringing the tables from version 2"))
+async fn change_tables(transaction: &Transaction<'_>, from: i32, steps: &[&str]) -> Result<(), NatsError> {
+    tell_move(from);
+    let text = format!("{}{VIEWS}\nINSERT INTO fleet_schema (version) VALUES ({VERSION});", steps.concat());
+    let doing = format!("bringing the tables from version {from}");
+    transaction.batch_execute(&text).await.map_err(to_nats_error(&doing))
 }
 
 /// Where the records of a batch lie before they go into their tables.

@@ -167,7 +167,8 @@ impl Database {
                     .append_time(row.at_us());
                 place.append_text(&row.kind).append_json(Some(record));
                 times.extend(RECORD_TABLES.iter().map(|table| (*table, day_of(row.at_us()))));
-                let until_us = row.record.as_ref().and_then(|record| record["until_ns"].as_i64()).map(|ns| ns / 1000);
+                let gap = row.record.as_ref().filter(|_| row.kind == "gap");
+                let until_us = gap.and_then(|record| record["until_ns"].as_i64()).map(|ns| ns / 1000);
                 times.extend(until_us.map(|until_us| ("state_list", day_of(until_us))));
             }
             latest.add(box_id, row, &series, *arrived_us);

@@ -267,7 +267,7 @@ impl Reader {
         })
     }
 
-    fn read_records<T>(
+    pub(crate) fn read_records<T>(
         &self,
         select: &str,
         span: RecordSpan,

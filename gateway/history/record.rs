@@ -1,5 +1,6 @@
 //! What is remembered besides samples: one struct per kind, one row each.
 
+use super::fact::Fact;
 use adapter_core::clock::TimeNs;
 use serde::{Deserialize, Serialize};
 
@@ -252,6 +253,8 @@ pub enum Record {
     Audit(Audit),
     /// An override was seen in force at the machine.
     Reaction(ReactionTime),
+    /// The plant has told a fact of its production.
+    Fact(Fact),
 }
 
 impl Record {
@@ -270,6 +273,7 @@ impl Record {
             Self::Diagnosis(record) => record.at_ns,
             Self::Audit(record) => record.at_ns,
             Self::Reaction(record) => record.at_ns,
+            Self::Fact(record) => record.at_ns,
         }
     }
 }
@@ -292,6 +296,8 @@ impl Record {
             }
             Self::Audit(record) => move_ns(&mut record.at_ns),
             Self::Reaction(record) => move_ns(&mut record.at_ns),
+            // The times of whoever told it.
+            Self::Fact(_) => {}
         }
     }
 }
@@ -308,4 +314,4 @@ macro_rules! into_record {
 
 into_record!(Event => Event, Alarm => Alarm, AlarmClear => AlarmClear, StateChange => State, Part => Part,
     Decision => Decision, Command => Command, Model => Model, Diagnosis => Diagnosis, Audit => Audit,
-    ReactionTime => Reaction);
+    ReactionTime => Reaction, Fact => Fact);

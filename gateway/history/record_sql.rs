@@ -1,9 +1,9 @@
 //! Records into their tables.
 
-use super::audit;
 use super::record::{
     Alarm, AlarmClear, Command, Decision, Diagnosis, Event, Model, Part, ReactionTime, Record, StateChange,
 };
+use super::{audit, fact};
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use rusqlite::{Connection, OptionalExtension, Params, params};
 use std::ops::Range;
@@ -36,6 +36,7 @@ pub(crate) fn store_record(db: &Connection, record: &Record) -> Result<(), rusql
         Record::Diagnosis(diagnosis) => store_diagnosis(db, diagnosis),
         Record::Audit(row) => audit::append_row(db, row),
         Record::Reaction(reaction) => store_reaction(db, reaction),
+        Record::Fact(fact) => fact::store_fact(db, fact),
     }
 }
 

@@ -25,7 +25,7 @@ struct RowKind {
 
 const HOUR_NS: i64 = 3_600 * SECOND_NS;
 
-static KINDS: [RowKind; 15] = [
+static KINDS: [RowKind; 16] = [
     RowKind {
         name: "raw samples",
         table: "blocks",
@@ -42,6 +42,7 @@ static KINDS: [RowKind; 15] = [
     define_kind("day summaries", "days", "day", 24 * HOUR_NS, "1", |retention| retention.records_days),
     define_kind("states", "states", "since_ns", 1, "until_ns IS NOT NULL", |retention| retention.records_days),
     define_kind("parts", "parts", "ended_ns", 1, "1", |retention| retention.records_days),
+    define_kind("facts", "facts", "at_ns", 1, "1", |retention| retention.records_days),
     define_kind("diagnoses", "diagnoses", "at_ns", 1, "1", |retention| retention.records_days),
     define_kind("models", "models", "at_ns", 1, "id < (SELECT max(id) FROM models)", |retention| {
         retention.records_days

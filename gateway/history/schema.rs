@@ -10,18 +10,19 @@ use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, params};
 use std::path::Path;
 
 /// Newest schema this version knows; stored as `user_version`.
-pub(crate) const SCHEMA: i64 = 5;
+pub(crate) const SCHEMA: i64 = 6;
 /// `cncg`, stored as `application_id` of files of older versions, whose pages have no sums.
 pub(crate) const APPLICATION: i64 = 0x636e_6367;
 /// `cncs`, stored as `application_id` of files whose pages have sums ([`pages`]).
 pub(crate) const SEALED_APPLICATION: u32 = 0x636e_6373;
 const TABLES: &str = include_str!("schema.sql");
 /// What each schema adds to the one before, beginning with 2. A new file gets all of it.
-const ADDED: [&str; 4] = [
+const ADDED: [&str; 5] = [
     include_str!("schema_2.sql"),
     include_str!("schema_3.sql"),
     include_str!("schema_4.sql"),
     include_str!("schema_5.sql"),
+    include_str!("schema_6.sql"),
 ];
 
 /// Opens the file for writing and creates the tables in a new one.

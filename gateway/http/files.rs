@@ -55,6 +55,7 @@ pub(super) static FILES: &[WebFile] = files! {
     SCRIPT "history.js" from "views/history.js",
     SCRIPT "history-charts.js" from "views/history/charts.js",
     SCRIPT "history-overview.js" from "views/history/overview.js",
+    SCRIPT "history-facts.js" from "views/history/facts.js",
     SCRIPT "wear.js" from "views/wear.js",
     SCRIPT "thermal.js" from "views/thermal.js",
     SCRIPT "twin.js" from "views/twin.js",

@@ -37,6 +37,7 @@ pub(super) const ROUTES: &[Route] = &[
     Route::read("/api/v1/decisions", || get(serve_decisions)),
     Route::read("/api/v1/events", || get(serve_events)),
     Route::read("/api/v1/parts", || get(serve_parts)),
+    Route::read("/api/v1/facts", || get(serve_facts)),
     Route::read("/api/v1/audit", || get(serve_audit)),
     Route::read("/api/v1/audit/verify", || get(verify_audit)),
 ];
@@ -122,6 +123,11 @@ pub(super) async fn serve_events(State(shared): State<ServerState>, Pairs(pairs)
 /// `GET /api/v1/parts`: the parts that were finished.
 pub(super) async fn serve_parts(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
     serve_records(shared, RecordKind::Parts, pairs).await
+}
+
+/// `GET /api/v1/facts`: what the plant has told of the range.
+pub(super) async fn serve_facts(State(shared): State<ServerState>, Pairs(pairs): HistoryQuery) -> Answer {
+    serve_records(shared, RecordKind::Facts, pairs).await
 }
 
 /// `GET /api/v1/audit`: `history audit --json`, by pages. With `since` the rows after that number, with `from` and `to` those of

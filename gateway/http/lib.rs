@@ -13,6 +13,7 @@ mod configuration_file;
 mod connection;
 mod description;
 mod diagnoses;
+mod facts;
 mod files;
 pub mod gallery;
 mod guard;
@@ -210,6 +211,7 @@ const GROUPS: &[&[Route]] = &[
     backtests::ROUTES,
     sign_in::ROUTES,
     orders::ROUTES,
+    facts::ROUTES,
 ];
 
 /// Everything that is served.

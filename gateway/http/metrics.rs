@@ -9,6 +9,7 @@ use axum::extract::State;
 use axum::http::header;
 use axum::response::IntoResponse;
 use axum::routing::get;
+use gateway_base::machine_path::MachinePath;
 use gateway_sinks::SinkStatus;
 use gateway_status::alignment::AlignmentStatus;
 use gateway_status::{NumberOrWord, Status};
@@ -89,6 +90,20 @@ impl Page {
 fn format_label(name: &str, value: &str) -> String {
     let value = value.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n");
     format!("{name}=\"{value}\"")
+}
+
+/// Which machine this is: its name, and where it has a path, the path and each of its levels. The level of the machine itself is
+/// `machine_id`, because `machine` is the name.
+fn format_identity(status: &Status) -> String {
+    let name = |level: &'static str| if level == "machine" { "machine_id" } else { level };
+    let levels = status.path.iter().flat_map(MachinePath::list_levels);
+    let place = status.path.iter().map(|path| format_label("path", &path.format_topic()));
+    [format_label("version", status.version), format_label("machine", &status.machine)]
+        .into_iter()
+        .chain(place)
+        .chain(levels.map(|(level, word)| format_label(name(level), word)))
+        .collect::<Vec<_>>()
+        .join(",")
 }
 
 fn write_quantities(page: &mut Page, status: &Status) {
@@ -251,8 +266,12 @@ fn write_machine(page: &mut Page, status: &Status) {
 }
 
 fn write_process(page: &mut Page, status: &Status) {
-    let labels = format!("{},{}", format_label("version", status.version), format_label("machine", &status.machine));
-    page.write_family("cncgw_build_info", "gauge", "Version of the program, and name of the machine", [(labels, 1.0)]);
+    page.write_family(
+        "cncgw_build_info",
+        "gauge",
+        "Version of the program, and name of the machine",
+        [(format_identity(status), 1.0)],
+    );
     page.write_gauge("cncgw_uptime_seconds", "Seconds since the start of the process", status.uptime_s);
     page.write_counter("cncgw_ticks_total", "Ticks since the start", status.tick.count);
     page.write_counter("cncgw_ticks_skipped_total", "Ticks left out because the box was too late", status.tick.skipped);

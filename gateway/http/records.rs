@@ -1,7 +1,9 @@
 //! What the history holds besides samples, as rows of JSON: the same for the API and the command line.
 
 use adapters::clock::TimeNs;
-use gateway_history::{AlarmEntry, Command, Decision, Event, HistoryError, Part, Reader, RecordSpan, StateInterval};
+use gateway_history::{
+    AlarmEntry, Command, Decision, Event, Fact, HistoryError, Part, Reader, RecordSpan, StateInterval,
+};
 use gateway_pipeline::PartDetail;
 use serde_json::{Value, json};
 
@@ -23,6 +25,8 @@ pub enum RecordKind {
     Events,
     /// Finished parts.
     Parts,
+    /// What the plant has told: orders, scrap, reasons, persons, planned time.
+    Facts,
 }
 
 impl RecordKind {
@@ -36,6 +40,7 @@ impl RecordKind {
             Self::Commands => "commands",
             Self::Events => "events",
             Self::Parts => "parts",
+            Self::Facts => "facts",
         }
     }
 }
@@ -77,6 +82,7 @@ pub fn read_records(reader: &Reader, kind: RecordKind, query: &RecordQuery) -> R
         RecordKind::Commands => reader.read_commands(span)?.iter().map(build_command_row).collect(),
         RecordKind::Events => reader.read_events(span)?.iter().map(build_event_row).collect(),
         RecordKind::Parts => reader.read_parts(span)?.iter().map(build_part_row).collect(),
+        RecordKind::Facts => reader.read_facts(span)?.iter().map(build_fact_row).collect(),
     };
     let mut truncated = rows.len() >= limit as usize;
     if let Some(state) = &query.state {
@@ -170,6 +176,14 @@ fn build_command_row(command: &Command) -> Value {
 fn build_event_row(event: &Event) -> Value {
     let Event { at_ns, kind, source, text, detail } = event;
     json!({ "at_ms": to_milliseconds(*at_ns), "kind": kind, "source": source, "text": text, "detail": non_empty_text(detail) })
+}
+
+fn build_fact_row(fact: &Fact) -> Value {
+    json!({
+        "from_ms": to_milliseconds(fact.from_ns), "to_ms": fact.until_ns.map(to_milliseconds), "fact": fact.fact.as_word(),
+        "value": non_empty_text(&fact.value), "parts": fact.parts, "id": fact.mark, "way": fact.way,
+        "author": non_empty_text(&fact.author), "told_ms": to_milliseconds(fact.at_ns),
+    })
 }
 
 /// Parts of an older version carry no detail.

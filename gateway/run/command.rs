@@ -3,6 +3,7 @@
 
 use super::acknowledged_alarms::AcknowledgedAlarms;
 use super::actuator_worker::{ActuatorReport, ActuatorWorker};
+use super::facts::FactMarks;
 use super::health::Health;
 use super::network_requests::{ControlState, NetworkRequests};
 use super::offset_commands::{self, OffsetCommands};
@@ -37,6 +38,7 @@ pub struct Commands {
     pub(super) network: NetworkRequests,
     /// The override at the control.
     pub(super) control: ControlState,
+    pub(super) fact_marks: FactMarks,
     trail: audit::Trail,
     /// Who armed it last.
     by: String,
@@ -49,13 +51,13 @@ pub struct Commands {
 }
 
 impl Commands {
-    /// Commands that this worker writes to the source of this name.
+    /// Commands that this worker writes to the source of this name; `fact_marks` are those of the facts that are stored already.
     #[must_use]
     pub fn new(
         actuator_worker: ActuatorWorker,
         shifting: OffsetCommands,
         target: String,
-        inbox: OrderReceiver,
+        (inbox, fact_marks): (OrderReceiver, FactMarks),
     ) -> Self {
         Self {
             actuator_worker,
@@ -65,6 +67,7 @@ impl Commands {
             acknowledged_alarms: AcknowledgedAlarms::default(),
             network: NetworkRequests::default(),
             control: ControlState::default(),
+            fact_marks,
             trail: audit::Trail::default(),
             by: String::new(),
             was_armed: false,
@@ -107,6 +110,7 @@ impl Commands {
             let _gone = reply.send(answer);
         }
         self.store_posted_rows(sample.at_ns, health);
+        self.store_facts(sample.at_ns, health);
         self.hear_network(gate, sample.at_ns, health);
         if !health.is_storing() {
             gate.disarm(Disarmed::NoAudit);

@@ -6,6 +6,7 @@ pub mod command;
 pub mod deadline;
 mod end;
 pub mod energy;
+mod facts;
 pub mod health;
 pub mod history_store;
 pub mod live_twin;
@@ -75,7 +76,6 @@ use wear::Wear;
 const BLOCKING_MAX: usize = 6;
 /// Time between two looks at the file of persons.
 const FOLLOW_EVERY: Duration = Duration::from_secs(1);
-
 /// Time between two signs of life of the threads that answer the page.
 const PAGE_BEAT: Duration = Duration::from_secs(1);
 
@@ -269,7 +269,7 @@ fn build_ticker(
     if let Some(thermal) = &mut thermal {
         thermal.report_notices(&mut health, start_ns);
     }
-    let text = format!("{} is being polled; everything is kept in {}", identity.machine, data_dir.display());
+    let text = format!("{} is being polled; everything is kept in {}", identity.machine.name, data_dir.display());
     health.record_event(start_ns, "gateway", &Notice::new(Severity::Info, "started", text));
     told.iter().for_each(|notice| health.record_event(start_ns, "gateway", notice));
     started.notices.iter().for_each(|notice| health.record_event(start_ns, "clock", notice));
@@ -304,7 +304,7 @@ fn build_ticker(
 
 fn build_identity(plan: &RunPlan, simulated: bool) -> Identity {
     let gateway = &plan.config.gateway;
-    Identity { machine: gateway.name.clone(), simulated, speed: plan.speed.time_factor(), rate_hz: gateway.tick_hz }
+    Identity { machine: gateway.machine.clone(), simulated, speed: plan.speed.time_factor(), rate_hz: gateway.tick_hz }
 }
 
 /// Now; an accelerated machine begins after everything that the history already holds.

@@ -26,7 +26,7 @@ impl ConfiguredSinks {
         }
         let sinks = config.sinks.clone();
         let names = sinks.iter().map(|sink| sink.name.clone());
-        let outbox = Outbox::new(&config.gateway.name, config.outbox.clone(), names);
+        let outbox = Outbox::new(config.gateway.machine.clone(), config.outbox.clone(), names);
         let board =
             Board::new(outbox.clone(), sinks.iter().map(|sink| (sink.name.clone(), sink.address.text().to_owned())));
         Some(Self { outbox, board, sinks, history: config.history.path.clone() })

@@ -16,6 +16,7 @@ use adapters::clock::TimeNs;
 use adapters::simulated::Simulated;
 use adapters::threads::reach_fault_point;
 use gateway_base::log::{Notice, Severity};
+use gateway_base::machine_path::NamedMachine;
 use gateway_config::GateMode;
 use gateway_control::Wake;
 use gateway_gate::{Disarmed, ScriptRequest};
@@ -58,8 +59,8 @@ pub enum RunEnd {
 /// What does not change while the box runs.
 #[derive(Debug, Clone)]
 pub struct Identity {
-    /// Name of the machine.
-    pub machine: String,
+    /// Name of the machine, and its path in the plant.
+    pub machine: NamedMachine,
     /// Whether every source is simulated.
     pub simulated: bool,
     /// Machine time over real time; `None` as fast as possible.
@@ -251,7 +252,8 @@ impl Ticker {
         Status {
             schema: "status/1",
             version: env!("CARGO_PKG_VERSION"),
-            machine,
+            machine: machine.name,
+            path: machine.path,
             simulated,
             speed,
             at_ms: report::to_milliseconds(sample.at_ns),

@@ -3,6 +3,7 @@
 use super::RunPlan;
 use super::actuator_worker::{ActuatorWorker, Tools};
 use super::command::Commands;
+use super::facts::FactMarks;
 use super::history_store::StoredAudit;
 use super::offset_commands::OffsetCommands;
 use adapters::clock::Clock;
@@ -27,6 +28,7 @@ pub(super) fn build_commands(
     gate: &mut Gate,
     audit: StoredAudit,
 ) -> Result<Commands, CannotRun> {
+    let inbox = (inbox, FactMarks::from_history(&plan.config.history.path));
     let limits: &config::GateConfig = &plan.config.gate;
     let data_dir = &plan.config.gateway.data_dir;
     let target = limits.source.clone().unwrap_or_default();

@@ -84,7 +84,7 @@ mod tests {
         };
         let text = answers.render_configuration();
         let config = crate::config::parse("setup", &text, Path::new(""), []).expect("accepted");
-        assert_eq!(config.gateway.name, answers.machine);
+        assert_eq!(config.gateway.machine.name, answers.machine);
         assert_eq!(config.sources.len(), 2);
         assert!(config.http.tls && config.http.tokens_always);
     }

@@ -1,7 +1,7 @@
 //! Addresses of sinks: the notation of sources, with schemes of their own.
 
 use super::mail::MailTarget;
-use super::mqtt::MqttTarget;
+use super::mqtt::{Layout, MqttTarget};
 use super::nats::NatsSinkTarget;
 #[cfg(feature = "opcua")]
 use super::opcua::OpcuaTarget;
@@ -97,6 +97,27 @@ impl SinkAddress {
         matches!(self.target, SinkTarget::Mqtt(_) | SinkTarget::Sparkplug(_))
     }
 
+    /// Can a computer on the network of this sink tell the box facts of production?
+    #[must_use]
+    pub fn can_receive_facts(&self) -> bool {
+        matches!(self.target, SinkTarget::Mqtt(_))
+    }
+
+    /// What the address leaves to the path of the machine, and what to do where there is none.
+    #[must_use]
+    pub fn find_need_of_path(&self) -> Option<(&'static str, &'static str)> {
+        match &self.target {
+            SinkTarget::Mqtt(target) if target.layout == Layout::Uns => {
+                Some(("layout=uns has topics by the path of the machine, and there is none", WRITE_PATH))
+            }
+            SinkTarget::Sparkplug(target) if target.place.is_none() => Some((
+                "the address has no group and node, and the machine no path that could stand for them",
+                WRITE_PLACE,
+            )),
+            _ => None,
+        }
+    }
+
     /// Is the line encrypted, and does the box know who is at its other end?
     #[must_use]
     pub fn is_secured(&self) -> bool {
@@ -116,6 +137,10 @@ impl SinkAddress {
         SCHEMES.iter().any(|(known, _)| *known == scheme)
     }
 }
+
+const WRITE_PATH: &str = "write path = \"shanghai/line-2\" under [gateway], or another layout";
+const WRITE_PLACE: &str =
+    "write sparkplug://BROKER:1883/GROUP/NODE/DEVICE, or path = \"shanghai/line-2\" under [gateway]";
 
 impl fmt::Display for SinkAddress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -1,6 +1,7 @@
 //! `nats://HOST:4222,HOST:4222/PREFIX` and `natss://`: every item as one message in a JetStream stream.
 //!
-//! Subjects: `PREFIX.BOX.KIND`, where the prefix is `cnc` if none is written; the document is that of `mqtt://`. The header
+//! Subjects: `PREFIX.BOX.KIND`, where the prefix is `cnc` if none is written, with the path of the machine before the box where there is one:
+//! `PREFIX.PATH.BOX.KIND`. The document is that of `mqtt://`. The header
 //! `Nats-Msg-Id` is `<box>-<epoch>-<sequence>`: what a box sends twice within the stream's window is stored once. A message counts as
 //! delivered when the stream has acknowledged it, with replicas when most of them have it. Where the stream says that it has an item
 //! already which this run has made and never sent, the item is refused and told: something else sends under the name of this box.
@@ -61,7 +62,8 @@ impl NatsSink {
         let id = self.outbox.box_id();
         // `doctor` asks before there is a box.
         let id = if id.is_empty() { "doctor" } else { &id };
-        format!("{}.{id}.{kind}", self.target.prefix)
+        let place = self.outbox.path().map(|path| format!("{}.", path.format_dotted())).unwrap_or_default();
+        format!("{}.{place}{id}.{kind}", self.target.prefix)
     }
 
     fn build_message(&self, item: &Item, historical: bool) -> Outgoing {

@@ -8,8 +8,8 @@ use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_base::row_rate::RowRate;
 use gateway_base::{clock, moment};
 use gateway_control::{
-    NetworkRequest, OUTCOMES_MAX, OrderSender, OutcomeSender, Reply, RequestOrigin, RequestOutcome, RequestRefusal,
-    RequestedChange,
+    FactSender, FactsTaken, NetworkRequest, OUTCOMES_MAX, OrderSender, OutcomeSender, Reply, RequestOrigin,
+    RequestOutcome, RequestRefusal, RequestedChange, read_facts_json,
 };
 use serde_json::{Value as Json, json};
 use std::collections::VecDeque;
@@ -20,6 +20,12 @@ use tokio::sync::mpsc::{Receiver, channel};
 /// thrown away unanswered, and counted.
 const PER_S: f64 = 1.0;
 const AT_ONCE: f64 = 10.0;
+
+/// Messages of facts per second on average, and at once: a plant tells a week of shifts in one message, and counts scrap by hand.
+const FACTS_PER_S: f64 = 2.0;
+const FACTS_AT_ONCE: f64 = 50.0;
+/// A longer message is cut and read as what it is then: no document.
+const FACTS_BYTES_MAX: usize = 200_000;
 
 /// A request that is older is not obeyed: whoever asked for it may have gone, and wishes otherwise by now. Clocks of a plant differ by
 /// less, and a broker hands on within a second.
@@ -42,6 +48,8 @@ pub struct Requests {
     outcomes: OutcomeSender,
     coming: Receiver<RequestOutcome>,
     untold: Option<RequestOutcome>,
+    /// Facts of production, where the sink takes any.
+    facts_rate: Option<RowRate>,
 }
 
 impl Requests {
@@ -59,7 +67,40 @@ impl Requests {
             rate: RowRate::new(PER_S, AT_ONCE),
             began_ns: clock::now_ns(),
             recent_ids: VecDeque::new(),
+            facts_rate: None,
         }
+    }
+
+    /// The same for a sink whose network may tell facts, or may not.
+    #[must_use]
+    pub fn with_facts(self, allowed: bool) -> Self {
+        Self { facts_rate: allowed.then(|| RowRate::new(FACTS_PER_S, FACTS_AT_ONCE)), ..self }
+    }
+
+    /// May facts be told?
+    #[must_use]
+    pub fn takes_facts(&self) -> bool {
+        self.facts_rate.is_some()
+    }
+
+    /// Tells the facts of a message, and gives what became of it; `None` for what came too fast, which is not answered. A retained message
+    /// would come again at every connection, long after somebody has put it right.
+    pub async fn submit_facts(&mut self, payload: &[u8], retained: bool) -> Option<Reply> {
+        let now_ns = clock::now_ns();
+        self.facts_rate.as_mut()?.may_pass(now_ns)?;
+        if retained {
+            return Some(Reply::from_refusal("a retained message is no fact: publish it without the retain flag"));
+        }
+        let sender = FactSender { way: self.sink.clone(), author: String::new() };
+        let facts = match read_facts_json(payload.get(..FACTS_BYTES_MAX).unwrap_or(payload), &sender, now_ns) {
+            Ok(facts) => facts,
+            Err(error) => return Some(Reply::from_refusal(error.to_string())),
+        };
+        let Some(post) = &self.orders else { return Some(Reply::from_refusal("there is no box behind this sink")) };
+        Some(match post.send_facts(facts).await {
+            Ok(FactsTaken { new, known }) => Reply::from_success(format!("{new} stored, {known} known already")),
+            Err(error) => Reply::from_refusal(error.to_string()),
+        })
     }
 
     /// Of a sink behind which there is no gate.

@@ -11,4 +11,6 @@ pub struct SinkConfig {
     pub name: String,
     /// May computers on its network ask the gate for something?
     pub allow_requests: bool,
+    /// May computers on its network tell facts of production?
+    pub allow_facts: bool,
 }

@@ -9,6 +9,7 @@ mod gate;
 use adapter_core::histogram::Histogram;
 pub use gate::{AxisShift, GateStatus, OffsetStatus};
 pub use gateway_base::clock::ClockStatus;
+use gateway_base::machine_path::MachinePath;
 pub use gateway_base::problem::StatusProblem;
 use serde::Serialize;
 
@@ -303,6 +304,9 @@ pub struct Status {
     pub version: &'static str,
     /// Name of the machine.
     pub machine: String,
+    /// Where it stands in its plant, where somebody has said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub path: Option<MachinePath>,
     /// Is the machine simulated?
     pub simulated: bool,
     /// Machine time over real time; `null` when as fast as possible.

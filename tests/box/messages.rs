@@ -116,6 +116,52 @@ fn armed_without_a_machine_to_write_to_is_refused() {
 }
 
 #[test]
+fn a_path_that_some_output_could_not_carry_is_refused() {
+    let told_of = |lines: &str, sink: &str| {
+        let text = format!("[gateway]\n{lines}\n[[source]]\naddress = \"simulated://lathe\"\n{sink}");
+        told(&parse(&text, &[]).expect_err("refused"))
+    };
+    let word = "1 to 40 of the letters a-z, A-Z, 0-9, - and _, the first no - or _";
+    assert_eq!(
+        told_of("path = \"shanghai/line 2\"", ""),
+        format!(
+            "cnc-gateway.toml:2:8: `path = \"shanghai/line 2\"` cannot be used: \"line 2\" is no word of a path: {word}\n    for example path = \"shanghai/line-2\"\n"
+        )
+    );
+    assert!(
+        told_of("path = \"a/b/c/d/e\"", "")
+            .starts_with("cnc-gateway.toml:2:8: `path = \"a/b/c/d/e\"` cannot be used: 5 words; write 1 to 4")
+    );
+    assert_eq!(
+        told_of("name = \"车床七号\"\npath = \"shanghai\"", ""),
+        format!(
+            "cnc-gateway.toml:3:8: `name` is \"车床七号\", which cannot be the last word of a path\n    write machine = \"lathe-7\" under [gateway]: {word}\n"
+        )
+    );
+    assert!(
+        told_of("machine = \"lathe-7\"", "").starts_with("cnc-gateway.toml:2:11: `machine` is there without `path`")
+    );
+    assert!(
+        told_of("pathe = \"shanghai\"", "").contains("did you mean `path`"),
+        "{}",
+        told_of("pathe = \"shanghai\"", "")
+    );
+    for sink in ["mqtt://b/works?layout=uns", "sparkplug://b"] {
+        let said = told_of("", &format!("[[sink]]\naddress = \"{sink}\"\n"));
+        assert!(
+            said.starts_with("cnc-gateway.toml:6:11: ") && said.contains("path = \"shanghai/line-2\" under [gateway]"),
+            "{said}"
+        );
+    }
+    let near = told_of("path = \"shanghai\"", "[[sink]]\naddress = \"mqtt://b/works?layout=unz\"\n");
+    assert!(near.contains("uns"), "{near}");
+    let fine =
+        "[gateway]\nname = \"Lathe 7\"\npath = \"shanghai/line-2\"\n[[source]]\naddress = \"simulated://lathe\"\n";
+    let config = parse(fine, &[]).expect("all of it is right");
+    assert_eq!(config.gateway.machine.path.map(|path| path.format_topic()), Some("shanghai/line-2/Lathe-7".to_owned()));
+}
+
+#[test]
 fn two_machines_to_write_to_are_refused() {
     let sources = "[[source]]\nname = \"a\"\naddress = \"simulated://lathe\"\n[[source]]\nname = \"b\"\naddress = \"simulated://mill\"\n";
     let text = |offsets: &str| {

@@ -15,6 +15,7 @@ use adapters::Axis;
 use adapters::address::{Target, WriteMethod};
 use adapters::channel::find_nearest_name;
 use gateway_base::log::LogFormat;
+use gateway_base::machine_path::{MachinePath, NamedMachine, WORD_FORM};
 use rules::physics::explain::Language;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -33,9 +34,10 @@ pub(super) fn build_config(reading: &mut ConfigInput<'_>, base: &Path) -> Option
         each.for_each(|(position, (source, values))| stand_in::add(reading, source, values, position));
         sources
     });
+    let machine = build_machine(reading);
     let sinks = outputs::build_sinks(reading);
     let outbox = outputs::build_outbox(reading);
-    let gateway = build_gateway(reading, base)?;
+    let gateway = build_gateway(reading, machine?, base)?;
     let in_force = super::in_force::in_force(reading);
     Some(Config {
         in_force,
@@ -77,9 +79,30 @@ fn build_log(reading: &ConfigInput<'_>) -> Option<LogConfig> {
     Some(LogConfig { level: find_text(reading, "log", "level")?.parse().ok()?, format })
 }
 
-fn build_gateway(reading: &ConfigInput<'_>, base: &Path) -> Option<GatewayConfig> {
+/// The machine by its name, and by its path where one is written.
+fn build_machine(reading: &mut ConfigInput<'_>) -> Option<NamedMachine> {
+    let name = find_text(reading, "gateway", "name")?;
+    let origin = |key: &str| reading.get("gateway", key).map_or(Origin::Default, |found| found.origin.clone());
+    let (at_path, at_machine) = (origin("path"), origin("machine"));
+    let word = find_text(reading, "gateway", "machine");
+    let Some(above) = find_text(reading, "gateway", "path") else {
+        if word.is_some() {
+            let next = "write path = \"shanghai/line-2\" beside it, or leave it out";
+            reading.add_problem(&at_machine, "`machine` is there without `path`", next);
+        }
+        return Some(NamedMachine { name, path: None });
+    };
+    let path = MachinePath::new(&above, &word.unwrap_or_else(|| name.replace(' ', "-")));
+    if path.is_err() {
+        let what = format!("`name` is {name:?}, which cannot be the last word of a path");
+        reading.add_problem(&at_path, what, format!("write machine = \"lathe-7\" under [gateway]: {WORD_FORM}"));
+    }
+    path.ok().map(|path| NamedMachine { name, path: Some(path) })
+}
+
+fn build_gateway(reading: &ConfigInput<'_>, machine: NamedMachine, base: &Path) -> Option<GatewayConfig> {
     Some(GatewayConfig {
-        name: find_text(reading, "gateway", "name")?,
+        machine,
         tick_hz: find_number(reading, "gateway", "tick_hz")?,
         clock_confirm: find_seconds(reading, "gateway", "clock_confirm_s")?,
         language: match find_text(reading, "gateway", "language")?.as_str() {

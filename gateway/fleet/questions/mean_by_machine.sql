@@ -12,6 +12,7 @@ WITH spent AS (
 ), known AS (
   SELECT box_id, series_id, sum(number * seconds) AS total, sum(seconds) AS seconds FROM spent WHERE number IS NOT NULL AND seconds > 0 GROUP BY box_id, series_id
 )
-SELECT label AS machine, name, unit, total / seconds AS mean, seconds / 3600 AS hours_known
+SELECT label AS machine, name, unit, sum(total) / sum(seconds) AS mean, sum(seconds) / 3600 AS hours_known
 FROM known JOIN series USING (series_id) JOIN labels USING (box_id)
+GROUP BY label, name, unit
 ORDER BY label;

@@ -18,6 +18,7 @@ WITH stretch AS (
 ), known AS (
   SELECT box_id, sum(number * seconds) AS joule, sum(seconds) AS seconds FROM spent WHERE number IS NOT NULL AND seconds > 0 GROUP BY box_id
 )
-SELECT label AS machine, joule / seconds AS mean_w, seconds / 3600 AS hours_cutting
+SELECT label AS machine, sum(joule) / sum(seconds) AS mean_w, sum(seconds) / 3600 AS hours_cutting
 FROM known JOIN labels USING (box_id)
+GROUP BY label
 ORDER BY label;

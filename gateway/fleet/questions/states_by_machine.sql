@@ -1,7 +1,7 @@
 -- Hours of each machine in each state, the last seven days.
 SELECT label AS machine, state,
-       sum(extract(epoch FROM least(coalesce(until, now()), now()) - greatest(since, now() - interval '7 days'))) / 3600 AS hours
-FROM states JOIN labels USING (box_id)
-WHERE since < now() AND coalesce(until, now()) > now() - interval '7 days' AND since >= now() - interval '37 days'
+       sum(extract(epoch FROM least(coalesce(states.until, now()), now()) - greatest(states.since, now() - interval '7 days'))) / 3600 AS hours
+FROM states JOIN placements AS place ON place.box_id = states.box_id AND states.since >= place.since AND states.since < place.until
+WHERE states.since < now() AND coalesce(states.until, now()) > now() - interval '7 days' AND states.since >= now() - interval '37 days'
 GROUP BY label, state
 ORDER BY label, hours DESC;

@@ -29,6 +29,11 @@ INSERT INTO diagnosis_list (box_id, at, sequence, epoch, verdict, summary, diagn
 SELECT box_id, at, sequence, epoch, record ->> 'verdict', record ->> 'summary', record -> 'json'
 FROM incoming WHERE kind = 'diagnosis' ON CONFLICT DO NOTHING;
 
+INSERT INTO fact_list (box_id, since, until, fact, value, parts, mark, way, author, at, sequence, epoch)
+SELECT box_id, fleet_time((record ->> 'from_ns')::bigint), fleet_time((record ->> 'until_ns')::bigint), coalesce(record ->> 'fact', ''),
+       coalesce(record ->> 'value', ''), (record ->> 'parts')::bigint, coalesce(record ->> 'mark', ''), record ->> 'way', record ->> 'author', at, sequence, epoch
+FROM incoming WHERE kind = 'fact' AND record ->> 'from_ns' IS NOT NULL ON CONFLICT DO NOTHING;
+
 -- The end of a gap comes later than its beginning.
 INSERT INTO gap_list AS known (box_id, since, until, reason, sequence, epoch)
 SELECT DISTINCT ON (box_id, at) box_id, at, fleet_time((record ->> 'until_ns')::bigint), coalesce(record ->> 'reason', ''), sequence, epoch

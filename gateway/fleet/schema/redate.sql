@@ -21,4 +21,5 @@ CROSS JOIN LATERAL (
 CROSS JOIN LATERAL (
   SELECT items.kind IN ('minute', 'hour', 'day') OR (items.kind = 'gap' AND items.record ->> 'reason' = 'not_running') AS stays
 ) AS place
-WHERE wanted.total <> items.redated_ns;
+-- The times of a fact are those of whoever told it.
+WHERE wanted.total <> items.redated_ns AND items.kind <> 'fact';

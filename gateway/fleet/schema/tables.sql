@@ -1,4 +1,4 @@
--- Version 3. What `cnc-gateway fleet ingest` creates. Times are those of the machines; `arrived` is when the stream had the item.
+-- Version 5. What `cnc-gateway fleet ingest` creates. Times are those of the machines; `arrived` is when the stream had the item.
 CREATE TABLE fleet_schema (
   version int PRIMARY KEY,
   since timestamptz NOT NULL DEFAULT now()
@@ -33,7 +33,7 @@ CREATE TABLE items (
   box_id int NOT NULL,
   historical boolean NOT NULL,         -- came after newer ones, after an outage
   redated_ns bigint NOT NULL DEFAULT 0, -- by how much its time was moved, because the clock of the box had been wrong
-  kind text NOT NULL,                  -- sample, state, part, alarm, alarm_clear, decision, diagnosis, event, gap, minute, hour, day
+  kind text NOT NULL,                  -- sample, state, part, alarm, alarm_clear, decision, diagnosis, event, fact, gap, minute, hour, day
   series int[],
   numbers float8[],
   texts text[],

@@ -30,9 +30,27 @@ CREATE OR REPLACE FUNCTION fleet_join_states(box int, low timestamptz, high time
   WHERE changed.box_id = found.box_id AND changed.since = found.since AND changed.sequence = found.sequence AND changed.epoch = found.epoch
     AND (found.until IS NOT NULL OR found.since <= high) AND changed.until IS DISTINCT FROM found.until$$;
 
--- What each box is called: its machine, and where two boxes have one of the same name, the box as well.
+-- What each box is called: the path of the machine at which it stands; without a path its machine, and where two boxes have one of the
+-- same name, the box as well.
 CREATE OR REPLACE VIEW labels AS
-  SELECT box_id, CASE count(*) OVER (PARTITION BY machine) WHEN 1 THEN machine ELSE machine || ' (' || box || ')' END AS label FROM boxes;
+  SELECT box_id, coalesce(path, CASE count(*) OVER (PARTITION BY boxes.machine, path) WHEN 1 THEN boxes.machine ELSE boxes.machine || ' (' || box || ')' END) AS label
+  FROM boxes LEFT JOIN LATERAL (
+    SELECT path FROM box_machines LEFT JOIN machines USING (machine_id) WHERE box_machines.box_id = boxes.box_id ORDER BY since DESC LIMIT 1
+  ) AS place ON true;
+-- At which machine each box stood, and when: a row for each stay, from -infinity to infinity where there is one only. What a box has
+-- recorded before its first path is of that machine, too. Join by box and time, and group by `label`: a machine is one whatever box stood there.
+CREATE OR REPLACE VIEW placements AS
+  SELECT stay.box_id, stay.machine_id, path, coalesce(path, label) AS label, stay.since, stay.until
+  FROM (
+    SELECT boxes.box_id, machine_id,
+           CASE row_number() OVER stays WHEN 1 THEN '-infinity' ELSE box_machines.since END AS since,
+           coalesce(lead(box_machines.since) OVER stays, 'infinity') AS until
+    FROM boxes LEFT JOIN box_machines USING (box_id) WINDOW stays AS (PARTITION BY boxes.box_id ORDER BY box_machines.since)
+  ) AS stay
+  JOIN labels USING (box_id) LEFT JOIN machines USING (machine_id);
+-- The path of the machine at which a box stood at a time; empty where it had none.
+CREATE OR REPLACE FUNCTION fleet_path(box int, moment timestamptz) RETURNS text LANGUAGE sql STABLE PARALLEL SAFE AS
+  $$SELECT path FROM placements WHERE box_id = box AND since <= moment AND until > moment$$;
 -- Is the spindle or an axis at work in this state?
 CREATE OR REPLACE FUNCTION fleet_is_at_work(state text) RETURNS boolean LANGUAGE sql IMMUTABLE PARALLEL SAFE AS
   $$SELECT state IN ('spindle_start', 'idle', 'cutting', 'rapid', 'speed_change')$$;
@@ -41,7 +59,7 @@ CREATE OR REPLACE FUNCTION fleet_is_at_work(state text) RETURNS boolean LANGUAGE
 -- minute).
 CREATE OR REPLACE VIEW last_seen AS
   SELECT machine, box, first_seen, last_at, last_arrival, now() - last_arrival AS silent,
-         now() - last_arrival < interval '3 minutes' AS connected, last_sequence, box_id
+         now() - last_arrival < interval '3 minutes' AS connected, last_sequence, box_id, fleet_path(box_id, last_at) AS path
   FROM boxes LEFT JOIN box_latest USING (box_id);
 
 -- The newest value of every series; `missing_reason` where there is none.
@@ -55,16 +73,22 @@ CREATE OR REPLACE VIEW latest AS
   CROSS JOIN LATERAL jsonb_each(box_latest.cells) AS cell
   JOIN series ON series.series_id = cell.key::int;
 
--- What every machine is doing now: a row for each. A box that nobody hears has no state, whatever it said last.
+-- What every machine is doing now: a row for each, of the box that stands there now. A box that nobody hears has no state, whatever it said
+-- last.
 CREATE OR REPLACE VIEW machines_now AS
   SELECT machine, box, connected,
          CASE WHEN connected THEN newest.state ELSE 'no_data' END AS state,
          CASE WHEN connected THEN newest.since ELSE last_at END AS since,
-         newest.program, newest.tool, newest.state AS last_state, last_at, last_arrival, box_id
+         newest.program, newest.tool, newest.state AS last_state, last_at, last_arrival, box_id, path
   FROM last_seen
   LEFT JOIN LATERAL (
     SELECT state, since, program, tool FROM state_list WHERE state_list.box_id = last_seen.box_id ORDER BY since DESC, epoch DESC, sequence DESC LIMIT 1
-  ) AS newest ON true;
+  ) AS newest ON true
+  -- Another box has come to the machine since this one did.
+  WHERE NOT EXISTS (
+    SELECT FROM placements AS own JOIN box_machines AS later USING (machine_id)
+    WHERE own.box_id = last_seen.box_id AND own.until = 'infinity' AND later.box_id <> own.box_id
+      AND later.since > (SELECT max(since) FROM box_machines AS mine WHERE mine.box_id = own.box_id));
 
 -- Every value with the time for which it held: until the next one of its series, a gap, or what was heard last of the box. Conditions on
 -- box, name and `valid_from` are fast. Means: sum(number * seconds) / sum(seconds), where number is not null.
@@ -73,7 +97,7 @@ CREATE OR REPLACE VIEW readings AS
          items.numbers[cell.place] AS number, items.texts[cell.place - cardinality(items.numbers)] AS text,
          items.reasons[cell.place - cardinality(items.numbers) - cardinality(items.texts)] AS missing_reason,
          extract(epoch FROM held.until - items.at)::float8 AS seconds,
-         items.sequence, items.at_ns, items.arrived, items.historical, items.box_id
+         items.sequence, items.at_ns, items.arrived, items.historical, items.box_id, fleet_path(items.box_id, items.at) AS path
   FROM items
   CROSS JOIN LATERAL unnest(items.series) WITH ORDINALITY AS cell (series_id, place)
   JOIN series ON series.series_id = cell.series_id
@@ -91,21 +115,21 @@ CREATE OR REPLACE VIEW readings AS
 -- Means of minutes, hours and days. Conditions on name and on `hour`, `day`, `month` are fast; `at` is the beginning of the minute, hour, day.
 CREATE OR REPLACE VIEW minutes AS
   SELECT boxes.machine, boxes.box, series.name, series.unit, hour, hour + (place - 1) * interval '1 minute' AS at,
-         each.mean, each.least, each.greatest, each.seconds, minute_means.box_id
+         each.mean, each.least, each.greatest, each.seconds, minute_means.box_id, fleet_path(minute_means.box_id, hour) AS path
   FROM minute_means JOIN series USING (series_id) JOIN boxes USING (box_id)
   CROSS JOIN LATERAL unnest(minute_means.mean, minute_means.least, minute_means.greatest, minute_means.seconds)
     WITH ORDINALITY AS each (mean, least, greatest, seconds, place)
   WHERE each.seconds > 0;
 CREATE OR REPLACE VIEW hours AS
   SELECT boxes.machine, boxes.box, series.name, series.unit, day, day + (place - 1) * interval '1 hour' AS at,
-         each.mean, each.least, each.greatest, each.seconds, hour_means.box_id
+         each.mean, each.least, each.greatest, each.seconds, hour_means.box_id, fleet_path(hour_means.box_id, day + (place - 1) * interval '1 hour') AS path
   FROM hour_means JOIN series USING (series_id) JOIN boxes USING (box_id)
   CROSS JOIN LATERAL unnest(hour_means.mean, hour_means.least, hour_means.greatest, hour_means.seconds)
     WITH ORDINALITY AS each (mean, least, greatest, seconds, place)
   WHERE each.seconds > 0;
 CREATE OR REPLACE VIEW days AS
   SELECT boxes.machine, boxes.box, series.name, series.unit, month, month + (place - 1) * interval '1 day' AS at,
-         each.mean, each.least, each.greatest, each.seconds, day_means.box_id
+         each.mean, each.least, each.greatest, each.seconds, day_means.box_id, fleet_path(day_means.box_id, month + (place - 1) * interval '1 day') AS path
   FROM day_means JOIN series USING (series_id) JOIN boxes USING (box_id)
   CROSS JOIN LATERAL unnest(day_means.mean, day_means.least, day_means.greatest, day_means.seconds)
     WITH ORDINALITY AS each (mean, least, greatest, seconds, place)
@@ -114,36 +138,37 @@ CREATE OR REPLACE VIEW days AS
 -- Energy of each machine and day (UTC), all of it, also between parts: from the power of the whole machine on days that have one, else from
 -- that of the spindle. The running hour comes from its minutes. Conditions on `day` are fast.
 CREATE OR REPLACE VIEW energy_by_day AS
-  SELECT machine, box_id, day, sum(joule) / 3.6e6 AS kwh
+  SELECT machine, measured.box_id, day, sum(joule) / 3.6e6 AS kwh, path
   FROM (
-    SELECT machine, box_id, day, name, joule, bool_or(name = 'total_power_w') OVER (PARTITION BY box_id, day) AS whole
+    SELECT machine, box_id, day, at, name, joule, bool_or(name = 'total_power_w') OVER (PARTITION BY box_id, day) AS whole
     FROM (
-      SELECT machine, box_id, day, name, mean * seconds AS joule FROM hours
+      SELECT machine, box_id, day, at, name, mean * seconds AS joule FROM hours
       WHERE name IN ('total_power_w', 'spindle_power_w') AND at < date_trunc('hour', now(), 'UTC')
       UNION ALL
-      SELECT machine, box_id, date_trunc('day', hour, 'UTC'), name, mean * seconds FROM minutes
+      SELECT machine, box_id, date_trunc('day', hour, 'UTC'), at, name, mean * seconds FROM minutes
       WHERE name IN ('total_power_w', 'spindle_power_w') AND hour = date_trunc('hour', now(), 'UTC')
     ) AS power
   ) AS measured
+  JOIN placements ON placements.box_id = measured.box_id AND at >= since AND at < until
   WHERE name = CASE WHEN whole THEN 'total_power_w' ELSE 'spindle_power_w' END
-  GROUP BY machine, box_id, day;
+  GROUP BY machine, measured.box_id, day, path;
 
 -- The newest stretch of a machine that is connected has no end yet; of one that has gone it ends with what was heard last.
 CREATE OR REPLACE VIEW states AS
   SELECT boxes.machine, boxes.box, since,
          CASE WHEN until IS NULL AND NOT last_seen.connected THEN greatest(since, last_at) ELSE until END AS until,
-         state, program, tool, reason, sequence, box_id
+         state, program, tool, reason, sequence, box_id, fleet_path(box_id, since) AS path
   FROM state_list JOIN boxes USING (box_id) JOIN last_seen USING (box_id);
 CREATE OR REPLACE VIEW parts AS
   SELECT boxes.machine, boxes.box, began, ended, part, program, count, extract(epoch FROM ended - began)::float8 AS seconds,
-         cutting_s, energy_j, detail, sequence, box_id
+         cutting_s, energy_j, detail, sequence, box_id, fleet_path(box_id, ended) AS path
   FROM part_list JOIN boxes USING (box_id);
 CREATE OR REPLACE VIEW operations AS
-  SELECT boxes.machine, boxes.box, ended, program, part, operation, place, seconds, cutting_s, energy_j, mean_power_w, sequence, box_id
+  SELECT boxes.machine, boxes.box, ended, program, part, operation, place, seconds, cutting_s, energy_j, mean_power_w, sequence, box_id, fleet_path(box_id, ended) AS path
   FROM operation_list JOIN boxes USING (box_id);
 -- An alarm that was raised again while it stood is one alarm.
 CREATE OR REPLACE VIEW alarms AS
-  SELECT boxes.machine, boxes.box, mark.code, mark.source, mark.severity, mark.at AS raised, cleared.at AS cleared, mark.en, mark.zh, mark.sequence, box_id
+  SELECT boxes.machine, boxes.box, mark.code, mark.source, mark.severity, mark.at AS raised, cleared.at AS cleared, mark.en, mark.zh, mark.sequence, box_id, fleet_path(box_id, mark.at) AS path
   FROM alarm_marks AS mark JOIN boxes USING (box_id)
   LEFT JOIN LATERAL (
     SELECT raised FROM alarm_marks AS before
@@ -157,13 +182,21 @@ CREATE OR REPLACE VIEW alarms AS
   ) AS cleared ON true
   WHERE mark.raised AND before.raised IS DISTINCT FROM true;
 CREATE OR REPLACE VIEW gaps AS
-  SELECT boxes.machine, boxes.box, since, until, reason, box_id FROM gap_list JOIN boxes USING (box_id);
+  SELECT boxes.machine, boxes.box, since, until, reason, box_id, fleet_path(box_id, since) AS path FROM gap_list JOIN boxes USING (box_id);
 CREATE OR REPLACE VIEW events AS
-  SELECT boxes.machine, boxes.box, at, kind, source, text, detail, sequence, box_id FROM event_list JOIN boxes USING (box_id);
+  SELECT boxes.machine, boxes.box, at, kind, source, text, detail, sequence, box_id, fleet_path(box_id, at) AS path FROM event_list JOIN boxes USING (box_id);
 CREATE OR REPLACE VIEW decisions AS
   SELECT boxes.machine, boxes.box, at, decision ->> 'script' AS script, decision ->> 'wanted' AS wanted, (decision ->> 'value')::float8 AS value,
          decision ->> 'unit' AS unit, decision ->> 'reason' AS reason, decision ->> 'outcome' AS outcome,
-         decision ->> 'outcome_reason' AS outcome_reason, sequence, box_id
+         decision ->> 'outcome_reason' AS outcome_reason, sequence, box_id, fleet_path(box_id, at) AS path
   FROM decision_list JOIN boxes USING (box_id);
 CREATE OR REPLACE VIEW diagnoses AS
-  SELECT boxes.machine, boxes.box, at, verdict, summary, diagnosis, sequence, box_id FROM diagnosis_list JOIN boxes USING (box_id);
+  SELECT boxes.machine, boxes.box, at, verdict, summary, diagnosis, sequence, box_id, fleet_path(box_id, at) AS path FROM diagnosis_list JOIN boxes USING (box_id);
+
+-- What the plant has told. `order`, `operator` and `shift` hold until the next fact of their kind: `until` is then its beginning.
+CREATE OR REPLACE VIEW facts AS
+  SELECT boxes.machine, boxes.box, fact_list.since,
+         CASE WHEN fact IN ('order', 'operator', 'shift') THEN lead(fact_list.since) OVER (PARTITION BY place.label, fact ORDER BY fact_list.since, fact_list.at) ELSE fact_list.until END AS until,
+         fact, value, parts, mark, way, author, fact_list.at, sequence, fact_list.box_id, place.path, place.label
+  FROM fact_list JOIN boxes USING (box_id)
+  JOIN placements AS place ON place.box_id = fact_list.box_id AND fact_list.since >= place.since AND fact_list.since < place.until;

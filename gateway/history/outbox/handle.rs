@@ -5,6 +5,7 @@ use super::position::Position;
 use super::report::OutboxSettings;
 use crate::HistoryError;
 use adapter_core::clock::TimeNs;
+use gateway_base::machine_path::{MachinePath, NamedMachine};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -67,7 +68,7 @@ impl DeliveryState {
 
 #[derive(Debug)]
 struct SharedOutbox {
-    machine: String,
+    machine: NamedMachine,
     settings: OutboxSettings,
     head: watch::Sender<OutboxHead>,
     deliveries: Mutex<BTreeMap<String, DeliveryState>>,
@@ -107,10 +108,14 @@ fn lock_mutex<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl Outbox {
     /// The outbox of a machine for these sinks. Hand it to [`Options::outbox`](crate::Options::outbox).
     #[must_use]
-    pub fn new(machine: &str, settings: OutboxSettings, sinks: impl IntoIterator<Item = String>) -> Self {
+    pub fn new(
+        machine: impl Into<NamedMachine>,
+        settings: OutboxSettings,
+        sinks: impl IntoIterator<Item = String>,
+    ) -> Self {
         let standing = || DeliveryState::from_next(1);
         let shared = SharedOutbox {
-            machine: machine.to_owned(),
+            machine: machine.into(),
             settings,
             head: watch::Sender::new(OutboxHead::default()),
             deliveries: Mutex::new(sinks.into_iter().map(|name| (name, standing())).collect()),
@@ -126,7 +131,7 @@ impl Outbox {
     /// The outbox of a history that another process may be writing, for a sink that sends parts of it once more: it knows machine and box,
     /// and no items.
     #[must_use]
-    pub fn of_box(machine: &str, settings: OutboxSettings, box_id: &str) -> Self {
+    pub fn of_box(machine: impl Into<NamedMachine>, settings: OutboxSettings, box_id: &str) -> Self {
         let outbox = Self::new(machine, settings, []);
         outbox.set_identity(box_id.to_owned(), 0);
         outbox
@@ -135,7 +140,20 @@ impl Outbox {
     /// Name of the machine as configured.
     #[must_use]
     pub fn machine(&self) -> &str {
-        &self.shared.machine
+        &self.shared.machine.name
+    }
+
+    /// Where the machine stands in its plant; `None` where nobody has said.
+    #[must_use]
+    pub fn path(&self) -> Option<&MachinePath> {
+        self.shared.machine.path.as_ref()
+    }
+
+    /// One name for the machine, for receivers that know a single one: its path with points, whichever box stands there; the box
+    /// itself where there is no path.
+    #[must_use]
+    pub fn device_name(&self) -> String {
+        self.path().map_or_else(|| self.box_id(), MachinePath::format_dotted)
     }
 
     /// Names this box and this history: letters, digits and `-` of the name that the machine had at first, `-`, and digits that

@@ -106,7 +106,7 @@ pub enum Content {
     /// The values of one tick that changed.
     Sample(Vec<Reading>),
     /// [`Record::State`], [`Record::Part`], [`Record::Alarm`], [`Record::AlarmClear`], [`Record::Decision`],
-    /// [`Record::Diagnosis`] or [`Record::Event`].
+    /// [`Record::Diagnosis`], [`Record::Event`] or [`Record::Fact`].
     Record(Box<Record>),
     /// There are no samples from the time of the item on.
     Gap(Gap),
@@ -136,7 +136,7 @@ pub struct Item {
 }
 
 impl Item {
-    /// One word: `sample`, `state`, `part`, `alarm`, `alarm_clear`, `decision`, `diagnosis`, `event`, `gap`, `minute`, `hour`,
+    /// One word: `sample`, `state`, `part`, `alarm`, `alarm_clear`, `decision`, `diagnosis`, `event`, `fact`, `gap`, `minute`, `hour`,
     /// `day`.
     #[must_use]
     pub fn kind(&self) -> &'static str {
@@ -220,6 +220,7 @@ fn kind_of(record: &Record) -> &'static str {
         Record::Diagnosis(_) => "diagnosis",
         Record::Audit(_) => "audit",
         Record::Reaction(_) => "reaction",
+        Record::Fact(_) => "fact",
     }
 }
 
@@ -263,6 +264,7 @@ pub(super) fn is_deliverable(record: &Record) -> bool {
             | Record::Part(_)
             | Record::Decision(_)
             | Record::Diagnosis(_)
+            | Record::Fact(_)
     )
 }
 

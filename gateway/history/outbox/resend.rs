@@ -166,6 +166,7 @@ impl<'a> ResentItems<'a> {
         records.extend(reader.read_events(span)?.into_iter().map(Record::from));
         records.extend(reader.read_decisions(span)?.into_iter().map(Record::from));
         records.extend(reader.read_diagnoses(span)?.into_iter().map(Record::from));
+        records.extend(reader.read_facts_told(span)?.into_iter().map(Record::from));
         let within = records.into_iter().filter(|record| piece.contains(&record.at_ns()));
         Ok(within.map(|record| build_item(record.at_ns(), Content::Record(Box::new(record)))).collect())
     }

@@ -47,7 +47,7 @@ impl Repaired {
 }
 
 /// The tables and their keys, in an order in which nothing refers to what comes later.
-const TABLES: [(&str, Keys); 23] = [
+const TABLES: [(&str, Keys); 24] = [
     ("meta", Keys::Whole),
     ("series", Keys::Number("id")),
     ("segments", Keys::Number("id")),
@@ -65,6 +65,7 @@ const TABLES: [(&str, Keys); 23] = [
     ("commands", Keys::Number("id")),
     ("audit", Keys::Number("number")),
     ("reactions", Keys::Number("id")),
+    ("facts", Keys::Number("id")),
     ("models", Keys::Number("id")),
     ("diagnoses", Keys::Number("id")),
     ("wear_models", Keys::Number("id")),

@@ -89,7 +89,7 @@ impl Thermal {
         let next = "write the model anew with `cnc-gateway identify thermal --model`";
         let refused = |what: String| CannotRun::new(format!("{} {what}", path.display()), next);
         let text = std::fs::read_to_string(path).map_err(|error| refused(format!("cannot be read: {error}")))?;
-        let model = ThermalModel::read(&text, &config.gateway.name).map_err(refused)?;
+        let model = ThermalModel::read(&text, &config.gateway.machine.name).map_err(refused)?;
         let mut names: Vec<&str> = Vec::new();
         for term in &model.law.terms {
             if !names.contains(&term.sensor.as_str()) {

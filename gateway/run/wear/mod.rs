@@ -29,7 +29,7 @@ impl Wear {
     #[must_use]
     pub fn from_config(config: &Config) -> Self {
         let (model_library, told) = Library::watch_history(&config.history.path);
-        Self { machine: config.gateway.name.clone(), model_library, notice: told }
+        Self { machine: config.gateway.machine.name.clone(), model_library, notice: told }
     }
 
     /// Gives the pipeline what is new in the library; before the tick.

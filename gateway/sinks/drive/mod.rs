@@ -44,8 +44,8 @@ pub fn start_sinks(
     (outbox, board): (&Outbox, &Board),
     path: &Path,
 ) -> Sinks {
-    let opened = sinks.iter().map(|SinkConfig { name, address, allow_requests }| {
-        let requests = Requests::new(name, *allow_requests, Some(orders.clone()));
+    let opened = sinks.iter().map(|SinkConfig { name, address, allow_requests, allow_facts }| {
+        let requests = Requests::new(name, *allow_requests, Some(orders.clone())).with_facts(*allow_facts);
         (name.clone(), open_sink(address, (name, requests), outbox, path))
     });
     start_with(opened.collect(), outbox, board, path)

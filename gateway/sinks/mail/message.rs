@@ -57,8 +57,8 @@ fn format_body(outbox: &Outbox, AlarmMessage { item, alarm, historical }: AlarmM
     }
     lines.push(String::new());
     let began = moment::format_utc(item.at_ns);
+    let path = outbox.path().map(|path| ("path", path.format_topic()));
     let fields = [
-        ("machine", outbox.machine().to_owned()),
         ("severity", alarm.severity.clone()),
         ("code", alarm.code.clone()),
         ("source", alarm.source.clone()),
@@ -66,6 +66,7 @@ fn format_body(outbox: &Outbox, AlarmMessage { item, alarm, historical }: AlarmM
         ("box", outbox.box_id()),
         ("item", id.to_owned()),
     ];
+    let fields = [("machine", outbox.machine().to_owned())].into_iter().chain(path).chain(fields);
     lines.extend(fields.map(|(name, value)| format!("{name}: {}", on_one_line(&value))));
     if historical {
         lines.extend([

@@ -5,6 +5,9 @@
 //! | `items` | `PREFIX/KIND` | the document of the item ([`Item::to_json`]) with `machine`, `box` and `historical` |
 //! | `flat` | `PREFIX/KIND` | one object: `ts` (milliseconds since 1970), `machine`, `box`, `sequence`, `historical`, and every value or field by its name; a missing value is null |
 //! | `topics` | `PREFIX/NAME` for each value | the value alone, as text; nothing for a missing one. Records and means as in `flat` |
+//! | `uns` | `PREFIX/PATH/NAME`, or `PATH/NAME` without a prefix | as `topics`: one name space for a plant, in which a machine stands by its path |
+//!
+//! Documents hold the `path` of the machine where there is one.
 //!
 //! What a subscriber that comes late must know is retained: the newest state, part and diagnosis, with `topics` the newest value of
 //! each channel, and in every layout `PREFIX/latest` ([`build_latest_message`]).
@@ -24,6 +27,15 @@ pub enum Layout {
     Flat,
     /// A topic for each value.
     Topics,
+    /// The same below the path of the machine.
+    Uns,
+}
+
+impl Layout {
+    /// Has each value a topic of its own?
+    pub(super) fn divides_values(self) -> bool {
+        matches!(self, Self::Topics | Self::Uns)
+    }
 }
 
 /// Kinds whose newest message the broker keeps.
@@ -34,6 +46,9 @@ pub(crate) fn build_document(outbox: &Outbox, item: &Item, historical: bool) -> 
     let mut document = item.to_json();
     document["machine"] = Json::from(outbox.machine());
     document["box"] = Json::from(outbox.box_id());
+    if let Some(path) = outbox.path() {
+        document["path"] = Json::from(path.format_topic());
+    }
     document["historical"] = Json::from(historical);
     document
 }
@@ -54,7 +69,7 @@ pub(super) fn build_messages(
     match (layout, &item.content) {
         (Layout::Items, _) => vec![whole(build_document(outbox, item, historical))],
         // An old value must not take the place of a newer one that the broker keeps.
-        (Layout::Topics, Content::Sample(readings)) if !historical => {
+        (_, Content::Sample(readings)) if layout.divides_values() && !historical => {
             readings.iter().map(|reading| build_value_message(prefix, reading)).collect()
         }
         _ => vec![whole(build_flat_document(outbox, item, historical))],
@@ -102,7 +117,8 @@ fn build_common_fields(outbox: &Outbox, at_ns: TimeNs) -> Map<String, Json> {
         ("machine", json!(outbox.machine())),
         ("box", json!(outbox.box_id())),
     ];
-    fields.map(|(name, value)| (name.to_owned(), value)).into_iter().collect()
+    let path = outbox.path().map(|path| ("path", json!(path.format_topic())));
+    fields.into_iter().chain(path).map(|(name, value)| (name.to_owned(), value)).collect()
 }
 
 fn to_named_value(reading: &Reading) -> (String, Json) {

@@ -1,11 +1,12 @@
-//! `mqtt://HOST:PORT/PREFIX` and `mqtts://`: every item on topics under a prefix, in one of three [layouts](Layout).
+//! `mqtt://HOST:PORT/PREFIX` and `mqtts://`: every item on topics under a prefix, in one of four [layouts](Layout).
 //!
-//! The prefix is the box's name where none is written. `PREFIX/online` is retained and says `{"online":true}`, or by the will of the
+//! The prefix is the path of the machine where none is written, and the box's name where there is no path either. `PREFIX/online` is retained and says `{"online":true}`, or by the will of the
 //! connection `{"online":false}`. `PREFIX/latest` is retained and holds everything that is known now; it is written at most every
 //! `latest_s`.
 //!
 //! With `allow_requests` the box subscribes `PREFIX/request` and hands what comes to the gate ([`Requests`]); the answer goes to
-//! `PREFIX/request/answer`, and what became of it in the end to `PREFIX/request/outcome`. Without it nothing is subscribed: a network cannot ask the box for anything this way.
+//! `PREFIX/request/answer`, and what became of it in the end to `PREFIX/request/outcome`. With `allow_facts` it subscribes `PREFIX/fact/add`, and
+//! answers on `PREFIX/fact/answer`. Without them nothing is subscribed: a network cannot ask the box for anything this way.
 
 mod discovery;
 mod layout;
@@ -21,6 +22,7 @@ use super::{Batch, Pending, Requests, Sink, SinkError};
 use crate::address::TargetError;
 use adapter_core::address::Keys;
 use gateway_base::log::{Notice, Severity};
+use gateway_base::machine_path::MachinePath;
 use gateway_control::{Reply, RequestRefusal};
 use gateway_history::{Content, Item, Outbox, Record};
 use mqtt::{MqttMessage, Outgoing, Qos, Will};
@@ -30,12 +32,15 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 use tokio::time::Instant;
 
+/// Where the network tells facts. The items of facts that are taken stand on `PREFIX/fact`.
+const FACTS: &str = "fact/add";
+
 /// Where to, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MqttTarget {
     /// Address, TLS files and login of the broker.
     pub broker: BrokerTarget,
-    /// What every topic begins with; empty: the name of the box.
+    /// What every topic begins with; empty: the path of the machine, or else the name of the box.
     pub prefix: String,
     /// How hard a message is delivered.
     pub qos: Qos,
@@ -50,12 +55,13 @@ pub struct MqttTarget {
 impl MqttTarget {
     pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, TargetError> {
         let qos = keys.take_choice("qos", &[("1", Qos::AtLeastOnce), ("0", Qos::AtMostOnce)]);
-        let layouts = [("items", Layout::Items), ("flat", Layout::Flat), ("topics", Layout::Topics)];
+        let layouts =
+            [("items", Layout::Items), ("flat", Layout::Flat), ("topics", Layout::Topics), ("uns", Layout::Uns)];
         let layout = keys.take_choice("layout", &layouts);
         let latest = Duration::from_secs_f64(keys.take_number("latest_s", 2.0, 0.0, 3600.0));
         let discovery = keys.take_choice("discovery", &[("none", false), ("homeassistant", true)]);
-        if discovery && layout != Layout::Topics {
-            keys.add_problem("discovery=homeassistant needs layout=topics beside it".to_owned());
+        if discovery && !layout.divides_values() {
+            keys.add_problem("discovery=homeassistant needs layout=topics or layout=uns beside it".to_owned());
         }
         let (broker, prefix) = BrokerTarget::parse(body, keys, secured)?;
         if prefix.contains(['+', '#']) || prefix.starts_with('$') {
@@ -125,6 +131,17 @@ impl MqttSink {
         self.publish_messages(vec![answer], Qos::AtMostOnce).await
     }
 
+    /// Hands facts to the box and publishes what became of them.
+    async fn answer_facts(&mut self, message: &MqttMessage) -> Result<(), SinkError> {
+        let Some(Reply { done, text }) = self.requests.submit_facts(&message.payload, message.retained).await else {
+            return Ok(());
+        };
+        let says = json!({"done": done, "text": text});
+        let topic = self.format_topic("fact/answer");
+        let answer = Outgoing { topic, payload: says.to_string().into_bytes(), retain: false };
+        self.publish_messages(vec![answer], Qos::AtMostOnce).await
+    }
+
     /// Publishes which requests the machine has followed, and which it has not.
     async fn tell_outcomes(&mut self) -> Result<(), SinkError> {
         while let Some(outcome) = self.requests.next_outcome().map(format_outcome) {
@@ -137,9 +154,11 @@ impl MqttSink {
     }
 
     fn topic_prefix(&self) -> String {
-        match self.target.prefix.as_str() {
-            "" => self.outbox.box_id(),
-            prefix => prefix.to_owned(),
+        let place = self.outbox.path().map(MachinePath::format_topic);
+        match (self.target.prefix.as_str(), self.target.layout) {
+            ("", _) => place.unwrap_or_else(|| self.outbox.box_id()),
+            (prefix, Layout::Uns) => place.map_or_else(|| prefix.to_owned(), |place| format!("{prefix}/{place}")),
+            (prefix, _) => prefix.to_owned(),
         }
     }
 
@@ -148,7 +167,10 @@ impl MqttSink {
     }
 
     fn build_online_message(&self, online: bool) -> Outgoing {
-        let says = json!({"machine": self.outbox.machine(), "box": self.outbox.box_id(), "online": online});
+        let mut says = json!({"machine": self.outbox.machine(), "box": self.outbox.box_id(), "online": online});
+        if let Some(path) = self.outbox.path() {
+            says["path"] = Json::from(path.format_topic());
+        }
         Outgoing { topic: self.format_topic("online"), payload: says.to_string().into_bytes(), retain: true }
     }
 
@@ -189,7 +211,7 @@ impl MqttSink {
     async fn publish_initial_state(&mut self) -> Result<(), SinkError> {
         let prefix = self.topic_prefix();
         let mut messages = vec![self.build_online_message(true)];
-        if self.target.layout == Layout::Topics {
+        if self.target.layout.divides_values() {
             let latest = self.outbox.latest_readings();
             let provided = latest.iter().filter(|reading| !layout::is_unprovided(reading));
             messages.extend(provided.map(|reading| layout::build_value_message(&prefix, reading)));
@@ -261,9 +283,11 @@ impl Sink for MqttSink {
             self.link.connect(&self.target.broker, &name, Some(will)).await?;
             self.request = None;
             self.described.clear();
-            if self.requests.is_allowed() {
-                let filter = vec![self.format_topic("request")];
-                self.link.subscribe_to(filter, Qos::AtLeastOnce, &self.target.broker).await?;
+            let heard = [(self.requests.is_allowed(), "request"), (self.requests.takes_facts(), FACTS)];
+            let filters: Vec<String> =
+                heard.iter().filter(|(is_heard, _)| *is_heard).map(|(_, kind)| self.format_topic(kind)).collect();
+            if !filters.is_empty() {
+                self.link.subscribe_to(filters, Qos::AtLeastOnce, &self.target.broker).await?;
             }
             self.publish_initial_state().await
         })
@@ -295,8 +319,10 @@ impl Sink for MqttSink {
     fn serve_receiver(&mut self) -> Pending<'_, Result<(), SinkError>> {
         Box::pin(async move {
             self.tell_latest().await?;
-            if let Some(message) = self.request.take().filter(|message| message.topic == self.format_topic("request")) {
-                self.answer_request(message).await?;
+            match self.request.take() {
+                Some(message) if message.topic == self.format_topic("request") => self.answer_request(message).await?,
+                Some(message) if message.topic == self.format_topic(FACTS) => self.answer_facts(&message).await?,
+                _ => {}
             }
             self.tell_outcomes().await
         })

@@ -62,7 +62,7 @@ pub struct OpcuaTarget {
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct MachineIdentity {
     machine: String,
-    box_id: String,
+    device: String,
     manufacturer: Option<String>,
     model: Option<String>,
     serial_number: Option<String>,
@@ -71,12 +71,12 @@ struct MachineIdentity {
 impl MachineIdentity {
     fn from_target(target: &OpcuaTarget, outbox: &Outbox) -> Self {
         let [manufacturer, model, serial_number] = target.plate.clone();
-        Self { machine: outbox.machine().to_owned(), box_id: outbox.box_id(), manufacturer, model, serial_number }
+        Self { machine: outbox.machine().to_owned(), device: outbox.device_name(), manufacturer, model, serial_number }
     }
 
     /// Names the machine over all plants.
     fn uri(&self) -> String {
-        format!("{PRODUCT}:{}", self.box_id)
+        format!("{PRODUCT}:{}", self.device)
     }
 }
 

@@ -4,6 +4,7 @@
 
 use super::conditions::{self, AlarmKind};
 use super::model::{AVAILABILITY, Category, Component, DataItem, ITEMS};
+use gateway_base::machine_path::MachinePath;
 use std::fmt::Write;
 
 /// The machine in the file of an agent.
@@ -11,8 +12,8 @@ use std::fmt::Write;
 pub struct Described<'a> {
     /// Its name, as people know it.
     pub machine: &'a str,
-    /// The name of the box: the `uuid`, and the name under which the agent's `Adapters` refer to it.
-    pub box_id: &'a str,
+    /// The `uuid`, and the name under which the agent's `Adapters` refer to it: the path of the machine, or else the name of the box.
+    pub device: &'a str,
     /// What every identifier begins with, so that several machines can stand in one agent.
     pub prefix: &'a str,
 }
@@ -159,10 +160,10 @@ const SYSTEMS: [DevicePart; 2] =
     [(Component::Electric, "Electric", "electric", "electric"), (Component::Coolant, "Coolant", "coolant", "coolant")];
 
 fn write_device(described: Described<'_>, delivered: impl Fn(&str) -> bool) -> String {
-    let Described { machine, box_id, prefix } = described;
+    let Described { machine, device, prefix } = described;
     let items = ITEMS.iter().filter(|item| delivered(item.channel)).collect();
     let mut tree = Tree { out: String::new(), prefix, items };
-    tree.write_line(4, &format!("<Device id=\"{prefix}machine\" name=\"{box_id}\" uuid=\"{box_id}\">"));
+    tree.write_line(4, &format!("<Device id=\"{prefix}machine\" name=\"{device}\" uuid=\"{device}\">"));
     tree.write_line(6, &format!("<Description>{}</Description>", escape_text(machine)));
     tree.write_line(6, "<DataItems>");
     let availability = format!("id=\"{prefix}{AVAILABILITY}\" name=\"{AVAILABILITY}\" category=\"EVENT\"");
@@ -200,10 +201,14 @@ fn condition_item(prefix: &str, condition: &AlarmKind) -> String {
     format!("<DataItem id=\"{prefix}{name}\" name=\"{name}\" category=\"CONDITION\" type=\"{kind}\"/>")
 }
 
-/// What identifiers begin with where nobody says otherwise: the digits of the box, behind a letter as XML wants it.
+/// What identifiers begin with where nobody says otherwise: the path of the machine, or else the digits of the box, behind a letter as XML
+/// wants it.
 #[must_use]
-pub fn prefix_of(box_id: &str) -> String {
-    format!("m{}_", box_id.rsplit('-').next().unwrap_or_default())
+pub fn prefix_of(path: Option<&MachinePath>, box_id: &str) -> String {
+    match path {
+        Some(path) => format!("m_{}_", path.format_dotted()),
+        None => format!("m{}_", box_id.rsplit('-').next().unwrap_or_default()),
+    }
 }
 
 /// Can identifiers of XML begin with this?

@@ -33,7 +33,7 @@ pub(super) fn format_lines(lines: &[Line], least_ns: &mut TimeNs) -> String {
 /// What an agent that connects now must be told.
 #[derive(Debug, Default)]
 pub(super) struct Machine {
-    box_id: String,
+    device: String,
     at_ns: TimeNs,
     values: BTreeMap<&'static str, String>,
     /// Does the controller tell whether there are alarms?
@@ -44,8 +44,8 @@ pub(super) struct Machine {
 }
 
 impl Machine {
-    pub(super) fn new(box_id: &str, latest: &[Reading], at_ns: TimeNs) -> Self {
-        let mut machine = Self { box_id: box_id.to_owned(), at_ns, ..Self::default() };
+    pub(super) fn new(device: &str, latest: &[Reading], at_ns: TimeNs) -> Self {
+        let mut machine = Self { device: device.to_owned(), at_ns, ..Self::default() };
         machine.update_values(latest);
         machine
     }
@@ -154,7 +154,7 @@ impl Machine {
 
     /// A tool that was in use, as an asset of the standard.
     fn format_tool_asset(&self, tool: &str, at_ns: TimeNs) -> String {
-        let (at, device, tool) = (moment::format_utc(at_ns), &self.box_id, escape_attribute(tool));
+        let (at, device, tool) = (moment::format_utc(at_ns), &self.device, escape_attribute(tool));
         let id = format!("{device}.{tool}");
         format!(
             "@ASSET@|{id}|CuttingTool|<CuttingTool serialNumber=\"{tool}\" toolId=\"{tool}\" timestamp=\"{at}\" \

@@ -90,7 +90,7 @@ impl ShdrSink {
         self.stop();
         let listener = listen_on(&self.target.at).await?;
         let at_ns = self.outbox.watch_head().borrow().newest_ns.unwrap_or(0);
-        let machine = Machine::new(&self.outbox.box_id(), &self.outbox.latest_readings(), at_ns);
+        let machine = Machine::new(&self.outbox.device_name(), &self.outbox.latest_readings(), at_ns);
         let shared = Arc::new(AgentContext {
             machine: Mutex::new(machine),
             lines: broadcast::Sender::new(WAITING_MAX),

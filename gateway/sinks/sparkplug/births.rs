@@ -19,7 +19,7 @@ const BIRTH_DEATH: &str = "bdSeq";
 /// The number of each item, so that a receiver knows one that comes twice.
 const SEQUENCE: (&str, u64) = ("item/sequence", 1);
 /// One metric for each kind of record, with its alias.
-const RECORDS: [(&str, u64); 7] = [
+const RECORDS: [(&str, u64); 8] = [
     ("record/state", 2),
     ("record/part", 3),
     ("record/alarm", 4),
@@ -27,6 +27,8 @@ const RECORDS: [(&str, u64); 7] = [
     ("record/decision", 6),
     ("record/diagnosis", 7),
     ("record/event", 8),
+    // 9 to 12 are requests and their answers.
+    ("record/fact", 13),
 ];
 /// The alias of a series is its number in the history and this.
 const SERIES_FROM: u64 = 100;

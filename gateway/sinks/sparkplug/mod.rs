@@ -17,7 +17,8 @@
 //!   `request/outcome`. Nothing else that comes from the network
 //!   reaches anything.
 //!
-//! Without a DEVICE the metrics are those of the node itself.
+//! Without a DEVICE the metrics are those of the node itself. Without GROUP and NODE they are those of the machine's path: the levels before
+//! the machine, with points, and the machine.
 //!
 //! Source: Eclipse Sparkplug Specification 3.0.0; operational behaviour in chapter 5, topics in chapter 4.
 
@@ -25,11 +26,12 @@ mod births;
 mod commands;
 mod host;
 mod payload;
+mod place;
 
-use super::broker::{BrokerFailure, BrokerTarget, Link, client_name};
+pub use place::{SparkplugPlace, SparkplugTarget};
+
+use super::broker::{BrokerFailure, Link, client_name};
 use super::{Batch, Pending, Requests, Sink, SinkError};
-use crate::address::TargetError;
-use adapter_core::address::Keys;
 use commands::AskedChange;
 use gateway_base::clock;
 use gateway_history::{Cell, Outbox};
@@ -49,49 +51,9 @@ const NOTED_WITHIN: Duration = Duration::from_secs(3);
 /// A primary host that is not there within this is waited for with the usual pauses between two connections.
 const HOST_WITHIN: Duration = Duration::from_secs(10);
 
-/// Where to, and how.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SparkplugTarget {
-    /// Address, TLS files and login of the broker.
-    pub broker: BrokerTarget,
-    /// Group of nodes, for example the plant.
-    pub group: String,
-    /// Name of the edge node in its group.
-    pub node: String,
-    /// The machine; `None`: the metrics are those of the node.
-    pub device: Option<String>,
-    /// The host that must be there before anything is sent.
-    pub host: Option<String>,
-}
-
-impl SparkplugTarget {
-    pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, TargetError> {
-        let host = keys.take_text("host").filter(|host| !host.contains(['+', '#', '/']));
-        let (broker, rest) = BrokerTarget::parse(body, keys, secured)?;
-        let parts: Vec<&str> = rest.split('/').collect();
-        let (group, node, device) = match parts[..] {
-            [group, node] => (group, node, None),
-            [group, node, device] => (group, node, Some(device)),
-            _ => return Err(TargetError::NoNode),
-        };
-        if let Some(part) = parts.iter().find(|part| part.is_empty() || part.contains(['+', '#'])) {
-            return Err(TargetError::NodeName { part: (*part).to_owned() });
-        }
-        let device = device.map(str::to_owned);
-        Ok(Self { broker, group: group.to_owned(), node: node.to_owned(), device, host })
-    }
-
-    fn format_topic(&self, kind: &str) -> String {
-        let Self { group, node, .. } = self;
-        match self.device.as_ref().filter(|_| kind.starts_with('D')) {
-            Some(device) => format!("spBv1.0/{group}/{kind}/{node}/{device}"),
-            None => format!("spBv1.0/{group}/{kind}/{node}"),
-        }
-    }
-}
-
 pub(super) struct SparkplugSink {
     target: SparkplugTarget,
+    place: SparkplugPlace,
     name: String,
     outbox: Outbox,
     link: Link,
@@ -112,7 +74,9 @@ pub(super) struct SparkplugSink {
 
 impl SparkplugSink {
     pub(super) fn new(target: SparkplugTarget, (name, requests): (&str, Requests), outbox: &Outbox) -> Self {
+        let of_machine = || outbox.path().map_or_else(SparkplugPlace::of_nobody, SparkplugPlace::of_path);
         Self {
+            place: target.place.clone().unwrap_or_else(of_machine),
             target,
             name: name.to_owned(),
             outbox: outbox.clone(),
@@ -130,8 +94,8 @@ impl SparkplugSink {
 
     /// Takes what a message of the network asks for; true when there is something to attend to.
     fn accept_message(&mut self, message: &mqtt::MqttMessage) -> bool {
-        let of_node = message.topic == self.target.format_topic("NCMD");
-        if !of_node && message.topic != self.target.format_topic("DCMD") {
+        let of_node = message.topic == self.place.format_topic("NCMD");
+        if !of_node && message.topic != self.place.format_topic("DCMD") {
             return false;
         }
         let payload = match Payload::decode(&message.payload[..]) {
@@ -167,14 +131,14 @@ impl SparkplugSink {
     }
 
     fn data_kind(&self) -> &'static str {
-        if self.target.device.is_some() { "DDATA" } else { "NDATA" }
+        if self.place.device.is_some() { "DDATA" } else { "NDATA" }
     }
 
     /// The next message of the node, with its number.
     fn build_message(&mut self, kind: &str, metrics: Vec<payload::Metric>, at_ms: u64) -> Outgoing {
         let payload = Payload { timestamp: Some(at_ms), metrics, seq: Some(self.next.into()) };
         self.next = self.next.wrapping_add(1);
-        Outgoing { topic: self.target.format_topic(kind), payload: payload.encode_to_vec(), retain: false }
+        Outgoing { topic: self.place.format_topic(kind), payload: payload.encode_to_vec(), retain: false }
     }
 
     async fn publish_birth(&mut self) -> Result<(), SinkError> {
@@ -184,7 +148,7 @@ impl SparkplugSink {
         let mut machine = births::build_machine_metrics(&latest, &mut self.known, at_ms);
         machine.extend(commands::build_request_metrics(self.requests.is_allowed(), at_ms));
         let node = births::build_node_metrics(self.number, at_ms);
-        let messages = if self.target.device.is_some() {
+        let messages = if self.place.device.is_some() {
             vec![self.build_message("NBIRTH", node, at_ms), self.build_message("DBIRTH", machine, at_ms)]
         } else {
             vec![self.build_message("NBIRTH", [node, machine].concat(), at_ms)]
@@ -238,7 +202,7 @@ impl SparkplugSink {
 
     async fn say_death(&mut self) {
         let payload = births::build_death(self.number, now_ms()).encode_to_vec();
-        let death = Outgoing { topic: self.target.format_topic("NDEATH"), payload, retain: false };
+        let death = Outgoing { topic: self.place.format_topic("NDEATH"), payload, retain: false };
         // Where this does not go through, the will says the same.
         let _gone = self.link.publish_messages(vec![death], Qos::AtLeastOnce, &self.target.broker).await;
         self.link.disconnect_client().await;
@@ -247,7 +211,7 @@ impl SparkplugSink {
     /// The device dies when no source delivers anything, and lives as soon as one does.
     async fn say_device_death(&mut self) -> Result<(), SinkError> {
         let lives = self.outbox.latest_readings().iter().any(births::is_read);
-        if self.target.device.is_none() || self.dead || lives {
+        if self.place.device.is_none() || self.dead || lives {
             return Ok(());
         }
         self.dead = true;
@@ -268,7 +232,7 @@ impl SparkplugSink {
         self.number = number.to_le_bytes()[0];
         let payload = births::build_death(self.number, now_ms()).encode_to_vec();
         let will = Will {
-            topic: self.target.format_topic("NDEATH"),
+            topic: self.place.format_topic("NDEATH"),
             payload,
             qos: Qos::AtLeastOnce,
             retain: false,
@@ -276,8 +240,8 @@ impl SparkplugSink {
         };
         let name = client_name(&self.outbox.box_id(), &self.name);
         self.link.connect(&self.target.broker, &name, Some(will)).await?;
-        let mut commands = vec![self.target.format_topic("NCMD")];
-        commands.extend(self.target.device.as_ref().map(|_| self.target.format_topic("DCMD")));
+        let mut commands = vec![self.place.format_topic("NCMD")];
+        commands.extend(self.place.device.as_ref().map(|_| self.place.format_topic("DCMD")));
         commands.extend(self.state_topic());
         self.link.subscribe_to(commands, Qos::AtLeastOnce, &self.target.broker).await?;
         self.wait_for_host().await?;
@@ -372,7 +336,7 @@ impl Sink for SparkplugSink {
 
     fn close(&mut self) -> Pending<'_, ()> {
         Box::pin(async move {
-            if self.target.device.is_some() && !self.dead {
+            if self.place.device.is_some() && !self.dead {
                 let death = self.build_message("DDEATH", Vec::new(), now_ms());
                 let _gone = self.publish_messages(vec![death]).await;
             }

@@ -7,6 +7,7 @@ import { StateRibbon } from "/web/ribbon.js";
 import { HistoryData, columns, csv, download } from "/web/history-data.js";
 import { marksTable, partsTable, stateLegend, useTable } from "/web/history-tables.js";
 import { drawChooser, drawPlots, drawRibbon, readOut } from "/web/history-charts.js";
+import { FactsTab } from "/web/history-facts.js";
 import { drawOverview, drawWhole, drawWindow } from "/web/history-overview.js";
 
 const USUAL = ["spindle_power_w", "cutting_power_w", "spindle_speed_rpm", "feed_mm_min", "feed_override_pct"];
@@ -273,7 +274,7 @@ class HistoryView {
   drawTabs() {
     fill(
       this.tabs,
-      ["parts", "use", "marks"].map((word) =>
+      ["parts", "use", "marks", "facts"].map((word) =>
         make("button", "", t(`tab_${word}`), {
           type: "button",
           "aria-pressed": String(word === this.tab),
@@ -296,6 +297,7 @@ class HistoryView {
     };
     if (this.tab === "parts") partsTable(this.body, this.found, range, this.context, go);
     else if (this.tab === "marks") marksTable(this.body, this.found, range, go);
+    else if (this.tab === "facts") (this.facts ??= new FactsTab(this.context)).show(this.body, range);
     else
       useTable(this.body, range, this.context, this.by, (by) => {
         this.by = by;

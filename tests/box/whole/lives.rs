@@ -103,7 +103,7 @@ fn a_history_of_a_newer_version_is_kept_and_the_copy_of_before_goes_on() {
     crate::sealed::connect(&database).pragma_update(None, "user_version", 99).expect("changed");
     let refused = live(&quick);
     assert!(!refused.status.success() && stderr(&refused).contains("schema 99"), "{}", stderr(&refused));
-    fs::rename(data.join("kept"), data.join("history.db.schema-5")).expect("the copy of before");
+    fs::rename(data.join("kept"), data.join("history.db.schema-6")).expect("the copy of before");
     let told = live(&quick);
     assert!(told.status.success(), "{}", stderr(&told));
     assert!(stdout(&told).contains("goes on with the copy of before"), "{}", stdout(&told));

@@ -7,6 +7,7 @@ mod clock;
 mod cost;
 mod diagnosing;
 mod editing;
+mod facts;
 mod hostile;
 mod http;
 mod kill;

@@ -4,6 +4,8 @@
 //! they fail.
 
 mod boxes;
+mod identity;
+mod intake;
 mod killed;
 mod means;
 mod monitoring;

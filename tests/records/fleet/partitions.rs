@@ -40,7 +40,8 @@ fn run_over_midnight(lake: &Path, machine: &str, effect: &str, own: &Path) {
     let board = Board::new(outbox.clone(), [("lake".to_owned(), "parquet".to_owned())]);
     let address: SinkAddress = format!("parquet:{}", text(lake)).parse().expect("an address");
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().expect("threads");
-    let sink = gateway::config::SinkConfig { name: "lake".to_owned(), address, allow_requests: false };
+    let sink =
+        gateway::config::SinkConfig { name: "lake".to_owned(), address, allow_requests: false, allow_facts: false };
     let (post, _inbox) = gateway::control::create_queues();
     let sinks = runtime.block_on(async { drive::start_sinks(&[sink], &post, (&outbox, &board), &path) });
     let power = ChannelId::from_name("spindle_power_w").expect("in the table");

@@ -4,6 +4,7 @@ use crate::fleet::postgres::Postgres;
 use adapters::{Absence, ChannelId, Sample, Slot, Value};
 use gateway::clock::ClockMark;
 use gateway::history::{ExtraSeries, ExtraValue, Options, Outbox, OutboxSettings, Writer};
+use gateway::machine_path::NamedMachine;
 use gateway::sinks::{Board, Sinks, drive};
 use std::time::Duration;
 use testkit::nats_cluster::Cluster;
@@ -64,20 +65,25 @@ pub(crate) struct Recorded {
 
 impl Recorded {
     /// Of a machine whose ticks are so far apart; begins to send.
-    pub(crate) fn start(machine: &str, tick: Duration, address: &str) -> Self {
+    pub(crate) fn start(machine: impl Into<NamedMachine>, tick: Duration, address: &str) -> Self {
         let directory = tempfile::tempdir().expect("a directory");
         Self::again(directory, machine, tick, address)
     }
 
     /// The same history, opened again, perhaps under another name.
-    pub(crate) fn again(directory: tempfile::TempDir, machine: &str, tick: Duration, address: &str) -> Self {
+    pub(crate) fn again(
+        directory: tempfile::TempDir,
+        machine: impl Into<NamedMachine>,
+        tick: Duration,
+        address: &str,
+    ) -> Self {
         Self::with_clock(directory, machine, tick, address, Options::default().clock)
     }
 
     /// The same, with what is thought of the clock.
     pub(crate) fn with_clock(
         directory: tempfile::TempDir,
-        machine: &str,
+        machine: impl Into<NamedMachine>,
         tick: Duration,
         address: &str,
         clock: ClockMark,
@@ -98,7 +104,12 @@ impl Recorded {
         let runtime =
             tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().expect("threads");
         let address = address.parse().expect("an address");
-        let sink = gateway::config::SinkConfig { name: "fleet".to_owned(), address, allow_requests: false };
+        let sink = gateway::config::SinkConfig {
+            name: "fleet".to_owned(),
+            address,
+            allow_requests: false,
+            allow_facts: false,
+        };
         let board = Board::new(outbox.clone(), [("fleet".to_owned(), "nats".to_owned())]);
         let (post, _inbox) = gateway::control::create_queues();
         let sinks = runtime.block_on(async { drive::start_sinks(&[sink], &post, (&outbox, &board), &path) });

@@ -30,13 +30,13 @@ fn every_shift_of_a_plant_of_known_truth_has_its_value() {
     let rows = ask(&plant, "oee-per-shift");
     let has = |row: &str| assert!(rows.contains(&row.to_owned()), "{row} is not among {rows:#?}");
     // Nine hours, because the clocks went back; 6 h of them at work; two parts of 2.5 h in 6 h of work, without the standby.
-    has("Lathe 7 (A)|night|2026-10-24|2.0000|0.6667|0.8333|0.5556|9.0000");
+    has("Lathe 7 (A)|night|2026-10-24|2.0000|0.6667|0.8333|0.5556|9.0000|||");
     // No part: performance and OEE are not known, whatever the availability.
-    has("Lathe 7 (B)|night|2026-10-24||1.0000|||9.0000");
+    has("Lathe 7 (B)|night|2026-10-24||1.0000|||9.0000|||");
     // In Shanghai it is seven in the morning of the next day, and the early shift runs.
-    has("Mill 2|early|2026-10-26|2.0000|1.0000|1.0000|1.0000|1.0000");
+    has("Mill 2|early|2026-10-26|2.0000|1.0000|1.0000|1.0000|1.0000|||");
     // Of the first part of A two thirds lie in the late shift of UTC, which it did not end in.
-    has("Lathe 7 (A)|late|2026-10-24||1.0000|0.8333|0.8333|2.0000");
+    has("Lathe 7 (A)|late|2026-10-24||1.0000|0.8333|0.8333|2.0000|||");
     assert!(rows.iter().all(|row| !row.contains("early|2026-10-26|2.0000") || row.starts_with("Mill 2")), "{rows:#?}");
     every_panel_of_the_fleet(&plant);
     // Whatever the time zone of whoever asks: behind UTC, and ahead of it by half an hour beside whole ones.
@@ -45,8 +45,34 @@ fn every_shift_of_a_plant_of_known_truth_has_its_value() {
         assert_eq!(ask(&plant, "oee-per-shift"), rows, "{zone}");
         every_other_question(&plant, zone);
     }
+    told_facts(&plant);
     let labels = plant.postgres.sql("SELECT label FROM labels ORDER BY box_id");
     assert_eq!(labels, "Lathe 7 (A)\nLathe 7 (B)\nMill 2");
+}
+
+/// What the plant tells of lathe A changes availability and quality of its shifts, and of no other.
+fn told_facts(plant: &Plant) {
+    let before = ask(plant, "oee-per-shift");
+    plant.postgres.sql(include_str!("facts.sql"));
+    let rows = ask(plant, "oee-per-shift");
+    let has = |row: &str| assert!(rows.contains(&row.to_owned()), "{row} is not among {rows:#?}");
+    // Planned from 22:00 to 03:00; 3 h of these 5 at work. One of two parts is scrap. 0.6 x 0.8333 x 0.5.
+    has("Lathe 7 (A)|night|2026-10-24|2.0000|0.6000|0.8333|0.2500|9.0000|0.5000|1.0000|5.0000");
+    // Before the first plan everything that is known counts; after it, nothing was planned of a shift without one.
+    has("Lathe 7 (A)|late|2026-10-24||1.0000|0.8333|0.8333|2.0000|||");
+    has("Lathe 7 (A)|late|2026-10-25||||||||");
+    let others =
+        |rows: &[String]| rows.iter().filter(|row| !row.starts_with("Lathe 7 (A)")).cloned().collect::<Vec<_>>();
+    assert_eq!(others(&rows), others(&before));
+    let orders = ask(plant, "energy-per-order").into_iter().map(|row| {
+        let cells: Vec<&str> = row.split('|').collect();
+        [0, 1, 4, 5, 6, 7, 8].map(|column| cells[column]).join("|")
+    });
+    assert_eq!(
+        orders.collect::<Vec<_>>(),
+        ["Lathe 7 (A)|A-1|10.0000|1.0000||1.0000|1000.0000", "Lathe 7 (A)|A-2||1.0000|1.0000|1.0000|"]
+    );
+    assert_eq!(ask(plant, "stops-by-reason"), ["Lathe 7 (A)|setup|1.0000|2.0000"]);
 }
 
 /// Each question that stands in `fleet sql` for PostgreSQL, without its columns of time.
@@ -106,7 +132,7 @@ fn every_other_question(plant: &Plant, zone: &str) {
         assert_eq!(rows, expected, "{name} in {zone}");
     }
     let listed = stdout(&run(&["fleet", "sql"]));
-    let elsewhere = ["tables", "oee-per-shift"];
+    let elsewhere = ["tables", "oee-per-shift", "energy-per-order", "stops-by-reason"];
     let of_lake = |name: &&str| name.ends_with("-parquet") || name.ends_with("-clickhouse");
     let asked = |name: &&str| elsewhere.contains(name) || answers.iter().any(|(of, _, _)| of == name);
     let names = listed.trim().split(", ").filter(|name| !of_lake(name));

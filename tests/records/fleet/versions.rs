@@ -8,6 +8,23 @@ use std::path::Path;
 use std::process::Command;
 use testkit::process::{run, stderr, stdout};
 
+/// The version that this program writes.
+const VERSION: &str = "5";
+
+#[test]
+fn tables_of_version_3_are_brought_up_with_everything_in_them() {
+    let Some(plant) = Plant::start() else { return };
+    plant.postgres.sql(include_str!("version_3.sql"));
+    publish(&plant, &[sample(8, 0)]);
+    assert!(plant.ingest().contains("1 rows written"));
+    let sql = |statement: &str| plant.postgres.sql(statement);
+    assert_eq!(sql("SELECT max(version) FROM fleet_schema"), VERSION);
+    assert_eq!(sql("SELECT sequence FROM items ORDER BY at"), "7\n8");
+    assert_eq!(sql("SELECT state, program, path FROM states"), "cutting|O1|");
+    assert_eq!(sql("SELECT label, path FROM placements"), "Lathe 8|", "a box without a path is its machine");
+    assert_eq!(sql("SELECT count(*) FROM readings"), "3");
+}
+
 #[test]
 fn tables_of_version_2_are_brought_up_with_everything_in_them() {
     let Some(plant) = Plant::start() else { return };
@@ -15,7 +32,7 @@ fn tables_of_version_2_are_brought_up_with_everything_in_them() {
     publish(&plant, &[sample(8, 0)]);
     assert!(plant.ingest().contains("1 rows written"));
     let sql = |statement: &str| plant.postgres.sql(statement);
-    assert_eq!(sql("SELECT max(version) FROM fleet_schema"), "3");
+    assert_eq!(sql("SELECT max(version) FROM fleet_schema"), VERSION);
     assert_eq!(sql("SELECT sequence, epoch, redated_ns FROM items ORDER BY at"), "7|0|0\n8|0|0");
     assert_eq!(sql("SELECT state, program FROM states"), "cutting|O1");
     assert_eq!(sql("SELECT count(*) FROM readings"), "3");
@@ -47,7 +64,7 @@ fn tables_of_version_1_are_brought_up_with_everything_in_them() {
     publish(&plant, &[sample(7, 0)]);
     assert!(plant.ingest().contains("1 rows written"));
     let sql = |statement: &str| plant.postgres.sql(statement);
-    assert_eq!(sql("SELECT max(version) FROM fleet_schema"), "3");
+    assert_eq!(sql("SELECT max(version) FROM fleet_schema"), VERSION);
     assert_eq!(
         sql("SELECT box, machine FROM boxes ORDER BY box"),
         "Lathe-8-3fa9c1|Lathe 8\nMill-2-00ff00|Mill 2",

@@ -48,7 +48,7 @@ fn a_copy_is_kept_before_the_tables_change_and_an_older_version_goes_back_to_it(
 #[test]
 fn an_older_version_goes_on_with_the_copy_and_uses_no_number_twice() {
     let dir = tempfile::tempdir().expect("a directory");
-    let (path, copy) = (dir.path().join("h.db"), dir.path().join("h.db.schema-5"));
+    let (path, copy) = (dir.path().join("h.db"), dir.path().join("h.db.schema-6"));
     let outbox = || Outbox::new("lathe", OutboxSettings::default(), ["plant".to_owned()]);
     let next_number = |lines: std::ops::Range<i64>| {
         let outbox = outbox();

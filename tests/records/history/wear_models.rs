@@ -62,7 +62,7 @@ fn an_older_file_is_read_as_it_is_and_gets_the_table_when_it_is_written() {
     let version: i64 = rusqlite::Connection::open(&path)
         .and_then(|db| db.query_row("PRAGMA user_version", [], |row| row.get(0)))
         .expect("a number");
-    assert_eq!(version, 5);
+    assert_eq!(version, 6);
     let plan: String = rusqlite::Connection::open(&path)
         .and_then(|db| {
             let question = "EXPLAIN QUERY PLAN SELECT at_ns FROM events WHERE kind = 'x' AND at_ns >= 0 ORDER BY at_ns DESC, id DESC";

@@ -1,0 +1,160 @@
+//! Facts of production that nobody but the plant knows: which order runs, what was scrap, why the machine stood, who worked, when production
+//! was planned. A box cannot measure them; the figures of a shift need them.
+//!
+//! A fact is one typed record whatever door it came through, and is never changed: a wrong count is put right by a second fact with a negative
+//! one. Its [`Fact::mark`] makes a fact that comes twice known, here and in every receiver. Its times are those of whoever told it: where the
+//! clock of the box turns out to have been wrong they stay as they are.
+
+use super::error::{Doing, HistoryError};
+use super::list::RecordSpan;
+use super::reader::Reader;
+use adapter_core::clock::TimeNs;
+use rusqlite::{Connection, OptionalExtension, Row, params};
+use serde::{Deserialize, Serialize};
+
+/// What a fact tells of production.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FactKind {
+    /// From now on parts are made for this order; an empty value: for none.
+    #[default]
+    Order,
+    /// So many parts were scrap; a negative count takes back what was too much.
+    Scrap,
+    /// Why the machine stood in this stretch.
+    StopReason,
+    /// Who works at the machine from now on; an empty value: nobody.
+    Operator,
+    /// Which shift works from now on.
+    Shift,
+    /// Production was planned in this stretch.
+    PlannedTime,
+}
+
+impl FactKind {
+    /// All kinds, in the order of the handbook.
+    pub const ALL: [Self; 6] =
+        [Self::Order, Self::Scrap, Self::StopReason, Self::Operator, Self::Shift, Self::PlannedTime];
+
+    /// The word in documents and tables.
+    #[must_use]
+    pub const fn as_word(self) -> &'static str {
+        match self {
+            Self::Order => "order",
+            Self::Scrap => "scrap",
+            Self::StopReason => "stop_reason",
+            Self::Operator => "operator",
+            Self::Shift => "shift",
+            Self::PlannedTime => "planned_time",
+        }
+    }
+
+    /// The kind of this word.
+    #[must_use]
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.as_word() == word)
+    }
+
+    /// Does it hold for a stretch with an end?
+    #[must_use]
+    pub const fn has_end(self) -> bool {
+        matches!(self, Self::StopReason | Self::PlannedTime)
+    }
+}
+
+/// A fact as it is stored.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Fact {
+    /// When the box was told it.
+    pub at_ns: TimeNs,
+    /// When it happened, or from when on it holds.
+    pub from_ns: TimeNs,
+    /// Until when it holds; `None` for what holds until another fact of its kind, and for scrap.
+    pub until_ns: Option<TimeNs>,
+    /// What it tells of production.
+    pub fact: FactKind,
+    /// Number of the order, name, or reason; may be empty where the kind says so.
+    pub value: String,
+    /// Scrap parts, or parts that are planned of an order.
+    pub parts: Option<i64>,
+    /// By this a fact that comes twice is known.
+    pub mark: String,
+    /// Through which door it came: `http`, `csv`, `page`, or the name of a sink.
+    pub way: String,
+    /// The person who is signed in, or what the message calls its sender.
+    pub author: String,
+}
+
+/// Stores it once, whatever comes twice.
+pub(crate) fn store_fact(db: &Connection, fact: &Fact) -> Result<(), rusqlite::Error> {
+    db.prepare_cached(
+        "INSERT INTO facts (at_ns, from_ns, until_ns, fact, value, parts, mark, way, author)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9) ON CONFLICT (mark) DO NOTHING",
+    )?
+    .execute(params![
+        fact.at_ns,
+        fact.from_ns,
+        fact.until_ns,
+        fact.fact.as_word(),
+        fact.value,
+        fact.parts,
+        fact.mark,
+        fact.way,
+        fact.author
+    ])
+    .map(drop)
+}
+
+fn read_fact(row: &Row<'_>) -> Result<Fact, rusqlite::Error> {
+    let word: String = row.get(3)?;
+    Ok(Fact {
+        at_ns: row.get(0)?,
+        from_ns: row.get(1)?,
+        until_ns: row.get(2)?,
+        // The table takes no other word.
+        fact: FactKind::from_word(&word).unwrap_or_default(),
+        value: row.get(4)?,
+        parts: row.get(5)?,
+        mark: row.get(6)?,
+        way: row.get(7)?,
+        author: row.get(8)?,
+    })
+}
+
+impl Reader {
+    /// Does the file have the table? One of an older version that nobody has written since does not.
+    fn has_facts(&self) -> Result<bool, HistoryError> {
+        self.db
+            .query_row("SELECT 1 FROM sqlite_schema WHERE name = 'facts'", [], |_| Ok(()))
+            .optional()
+            .map(|found| found.is_some())
+            .with_activity("looking for facts")
+    }
+
+    /// Facts that happened or began in the range, the newest `limit` of them, oldest first.
+    ///
+    /// # Errors
+    /// What `SQLite` says.
+    pub fn read_facts(&self, span: RecordSpan) -> Result<Vec<Fact>, HistoryError> {
+        self.select_facts("from_ns", span)
+    }
+
+    /// Facts that the box was told in the range, the newest `limit` of them, oldest first.
+    ///
+    /// # Errors
+    /// What `SQLite` says.
+    pub fn read_facts_told(&self, span: RecordSpan) -> Result<Vec<Fact>, HistoryError> {
+        self.select_facts("at_ns", span)
+    }
+
+    fn select_facts(&self, time: &str, span: RecordSpan) -> Result<Vec<Fact>, HistoryError> {
+        if !self.has_facts()? {
+            return Ok(Vec::new());
+        }
+        let select = format!(
+            "SELECT at_ns, from_ns, until_ns, fact, value, parts, mark, way, author FROM facts
+             WHERE {time} >= ?1 AND {time} < ?2 ORDER BY {time} DESC, id DESC LIMIT ?3"
+        );
+        self.read_records(&select, span, read_fact)
+    }
+}
