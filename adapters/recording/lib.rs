@@ -4,9 +4,11 @@
 //! the order they were measured.
 
 mod derive;
+mod numbers;
 pub mod read;
 
 pub use derive::{DERIVABLE, OF_OTHER_ROWS, derive_quantity, with_derived};
+pub use numbers::Numbers;
 pub use read::mapping::{ColumnMapping, Mapping, MappingError, TimeMapping};
 pub use read::plan::{Note, NoteKind};
 pub use read::{ReadRecording, RecordingError, RowProblem, read_csv, read_path, read_path_as};
@@ -33,75 +35,14 @@ pub const TEXT_COLUMNS: [&str; 14] = [
     "recipe",
 ];
 
-/// Numbers with typed absence: `values[i]` is meaningful only where `present[i]`.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Numbers {
-    values: Vec<f64>,
-    present: Vec<bool>,
-}
-
-impl Numbers {
-    /// A column with a value in every row.
-    #[must_use]
-    pub fn from_values(values: Vec<f64>) -> Self {
-        let present = values.iter().map(|value| value.is_finite()).collect();
-        Self { values, present }
-    }
-
-    /// Appends a row. A number that is not finite counts as absent.
-    pub fn push(&mut self, value: Option<f64>) {
-        let value = value.filter(|value| value.is_finite());
-        self.values.push(value.unwrap_or(0.0));
-        self.present.push(value.is_some());
-    }
-
-    /// The value in `row`, if there is one.
-    #[must_use]
-    pub fn get(&self, row: usize) -> Option<f64> {
-        (*self.present.get(row)?).then(|| self.values[row])
-    }
-
-    /// The cells row by row; `None` is absent.
-    pub fn iter(&self) -> impl Iterator<Item = Option<f64>> + '_ {
-        self.values.iter().zip(&self.present).map(|(value, present)| present.then_some(*value))
-    }
-
-    /// The values that are present.
-    pub fn present_values(&self) -> impl Iterator<Item = f64> + '_ {
-        self.iter().flatten()
-    }
-
-    /// How many rows have a value.
-    #[must_use]
-    pub fn count_present(&self) -> usize {
-        self.present.iter().filter(|present| **present).count()
-    }
-
-    /// How many rows, absent cells included.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.values.len()
-    }
-
-    /// No rows at all.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.values.is_empty()
-    }
-}
-
-impl FromIterator<Option<f64>> for Numbers {
-    fn from_iter<I: IntoIterator<Item = Option<f64>>>(iter: I) -> Self {
-        let mut numbers = Self::default();
-        iter.into_iter().for_each(|value| numbers.push(value));
-        numbers
-    }
-}
+/// In the place of a word that is not there.
+const ABSENT: u32 = 0;
 
 /// Text, stored once per distinct word.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Words {
-    codes: Vec<Option<u32>>,
+    /// One more than the number of the word of a row; [`ABSENT`] where there is none.
+    codes: Vec<u32>,
     words: Vec<String>,
     numbers: HashMap<String, u32>,
 }
@@ -109,22 +50,23 @@ pub struct Words {
 impl Words {
     /// Appends a row; empty text counts as absent.
     pub fn push(&mut self, text: &str) {
-        let code = (!text.is_empty()).then(|| self.code_of(text));
+        let code = if text.is_empty() { ABSENT } else { self.code_of(text) };
         self.codes.push(code);
     }
 
     fn code_of(&mut self, text: &str) -> u32 {
         // The word of the row before is the likeliest to come again.
-        if let Some(Some(last)) = self.codes.last()
-            && self.words[*last as usize] == text
+        if let Some(last) = self.codes.last()
+            && *last != ABSENT
+            && self.words[*last as usize - 1] == text
         {
             return *last;
         }
         if let Some(known) = self.numbers.get(text) {
             return *known;
         }
-        let code = convert_bounded(self.words.len(), u32::MAX);
         self.words.push(text.to_owned());
+        let code = convert_bounded(self.words.len(), u32::MAX);
         self.numbers.insert(text.to_owned(), code);
         code
     }
@@ -138,13 +80,13 @@ impl Words {
     /// The number of the word in `row` within [`Words::words`].
     #[must_use]
     pub fn find_code(&self, row: usize) -> Option<u32> {
-        *self.codes.get(row)?
+        self.codes.get(row)?.checked_sub(1)
     }
 
     /// The words of these rows, with the same numbers.
     #[must_use]
     pub fn at_rows(&self, rows: impl Iterator<Item = usize>) -> Self {
-        let codes = rows.map(|row| self.find_code(row)).collect();
+        let codes = rows.map(|row| self.codes.get(row).copied().unwrap_or(ABSENT)).collect();
         Self { codes, words: self.words.clone(), numbers: self.numbers.clone() }
     }
 
@@ -266,11 +208,8 @@ impl Recording {
     /// Adds or replaces a column. Cells beyond the last row are cut, missing ones are absent.
     pub fn set_column(&mut self, name: &str, mut cells: Cells) {
         match &mut cells {
-            Cells::Numbers(numbers) => {
-                numbers.values.resize(self.count_rows(), 0.0);
-                numbers.present.resize(self.count_rows(), false);
-            }
-            Cells::Words(words) => words.codes.resize(self.count_rows(), None),
+            Cells::Numbers(numbers) => numbers.resize(self.count_rows()),
+            Cells::Words(words) => words.codes.resize(self.count_rows(), ABSENT),
         }
         match self.columns.iter_mut().find(|column| column.name == name) {
             Some(column) => column.cells = cells,

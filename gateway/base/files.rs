@@ -267,10 +267,19 @@ fn temporary_path(path: &Path) -> PathBuf {
     fresh.into()
 }
 
+/// The digest of nothing, see [`extend_digest`].
+pub const EMPTY_DIGEST: u64 = 0xcbf2_9ce4_8422_2325;
+
 /// FNV-1a: tells one text from another, keeps no secret.
 #[must_use]
 pub fn compute_digest(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3))
+    extend_digest(EMPTY_DIGEST, bytes)
+}
+
+/// The digest of what had this digest, with these bytes after it.
+#[must_use]
+pub fn extend_digest(digest: u64, bytes: &[u8]) -> u64 {
+    bytes.iter().fold(digest, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3))
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use crate::check::check_configuration;
 use crate::config::{self, keys};
 use ::rules::script::{Declared, list_declarations, list_shipped_scripts};
 use clap::Args;
+use gateway_base::limits::{TimeLimits, limit_memory_and_time};
 use std::path::{Path, PathBuf};
 
 /// Reads configuration, scripts, model and recordings and tells everything that is wrong at once.
@@ -58,7 +59,7 @@ fn read_declared_settings(config: Option<&Path>) -> Result<Vec<Declared>, Cannot
 
 fn report_problems(arguments: &CheckArguments) -> CommandResult {
     if arguments.has_limits {
-        gateway_base::limits::limit_memory_and_time().map_err(CannotRun::from_error)?;
+        limit_memory_and_time(TimeLimits::from_bytes(0)).map_err(CannotRun::from_error)?;
     }
     let unreadable = arguments.config.as_deref().filter(|path| std::fs::File::open(path).is_err());
     if let Some(path) = unreadable {

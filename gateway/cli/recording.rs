@@ -103,7 +103,7 @@ fn map(file: &RecordingFile, out: Option<&Path>, yes: bool) -> CommandResult {
         found.read.as_ref().map(adapters::recording::ReadRecording::describe_assumptions).unwrap_or_default();
     let name = file.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let text = proposal.to_toml(&statement, &name);
-    let after = verify_proposal(&file.file, &text, &found, &answered).map_err(|error| {
+    let after = verify_proposal(&file.file, &text, found, &answered).map_err(|error| {
         let zh = match &error {
             ProposalError::ReadsOtherwise(difference) => {
                 format!("未写入映射文件：按它读取结果会不同（{}）；不用映射文件即可读取", difference.zh)

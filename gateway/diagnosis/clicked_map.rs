@@ -49,7 +49,8 @@ impl ClickedMap {
         Mapping::parse(&toml, "the map")?;
         // Of the columns a person decides; the times stay as they are read unless something was said of them.
         if let Some(found) = found.filter(|_| !self.says_time() && self.decimal.is_empty()) {
-            verify_proposal(path, &toml, &found, &self.list_names(&found))?;
+            let names = self.list_names(&found);
+            verify_proposal(path, &toml, found, &names)?;
         }
         Ok(toml)
     }

@@ -1,6 +1,7 @@
 //! Files that persons bring to the page, and the diagnoses of them: kept in a folder of the data directory, so that they can be looked at and compared
 //! later. The work is done by the same child process as a diagnosis of the history, one at a time.
 
+use super::arriving::{ArrivalError, ArrivingFile, find_room};
 use super::child::{DiagnosisJob, JobInput};
 use super::clicked_map::ClickedMap;
 use super::handle::{DiagnosisHandle, DiagnosisRefusal};
@@ -9,7 +10,6 @@ use super::store::{DiagnosisStore, diagnosis_key};
 use super::worker::{DiagnosisRequest, in_child};
 use adapter_core::clock::TimeNs;
 use adapter_core::threads::receive_work;
-use gateway_base::files::compute_digest;
 use gateway_base::files::{read_text, replace_file};
 use recording::Mapping;
 use serde::{Deserialize, Serialize};
@@ -18,8 +18,9 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
-/// Files that are kept; of more the oldest goes.
+/// Files that are kept, and bytes of all of them; of more the oldest goes.
 const FILES_MAX: usize = 20;
+const KEPT_BYTES_MAX: usize = 640 << 20;
 /// Diagnoses that are listed.
 const RESULTS_MAX: usize = 40;
 /// A longer index is not read, bytes.
@@ -102,6 +103,8 @@ impl FileDiagnoses {
         let (model, history) = (directory.join("model.toml"), directory.join("history.db"));
         let handle = DiagnosisHandle::new(requests, model, history, kept);
         let own = Self { directory, handle, list: Arc::default(), reading: Arc::default() };
+        // What was arriving when the process before this one ended never came to its end.
+        let _there_was_none = std::fs::remove_dir_all(own.arriving());
         let (index, kept) = (own.index(), own.handle.diagnosis_store().clone());
         // The thread holds no handle that could ask: it ends when the last one outside is gone.
         let state = own.handle.without_requests();
@@ -128,27 +131,55 @@ impl FileDiagnoses {
         serde_json::from_str(&text).unwrap_or_default()
     }
 
-    /// Keeps a file.
+    /// A file of so many bytes begins to arrive; of how many is not known where its sender does not say.
+    ///
+    /// # Errors
+    /// The disk has no room for it, or the folder cannot be written.
+    pub fn receive(&self, bytes: Option<u64>) -> Result<ArrivingFile, ArrivalError> {
+        ArrivingFile::create(&self.arriving(), bytes.unwrap_or(0))
+    }
+
+    /// Bytes that files may still take; `None` where the system does not tell.
+    #[must_use]
+    pub fn find_free_bytes(&self) -> Option<u64> {
+        find_room(&self.directory).map(|room| room.free_bytes)
+    }
+
+    fn arriving(&self) -> PathBuf {
+        self.directory.join("arriving")
+    }
+
+    /// Keeps a file that has arrived.
     ///
     /// # Errors
     /// The folder cannot be written.
-    pub fn add(&self, name: &str, bytes: &[u8], at_ms: i64) -> std::io::Result<BroughtFile> {
-        let key = format!("{:016x}", compute_digest(bytes));
-        let file = BroughtFile { key: key.clone(), name: sanitize_name(name), at_ms, bytes: bytes.len() };
+    pub fn keep(&self, arrived: &ArrivingFile, name: &str, at_ms: i64) -> std::io::Result<BroughtFile> {
+        let key = format!("{:016x}", arrived.digest());
+        let file = BroughtFile { key: key.clone(), name: sanitize_name(name), at_ms, bytes: arrived.bytes() };
         let folder = self.directory.join(&key);
         let _guard = self.list.lock().unwrap_or_else(PoisonError::into_inner);
         std::fs::create_dir_all(&folder)?;
-        std::fs::write(folder.join("data"), bytes)?;
+        arrived.take_place(&folder.join("data"))?;
         // Whoever brings it again wants it read again.
         preview::forget_answers(&folder.join("data"));
         let mut files = self.list_files();
         files.retain(|known| known.key != key);
         files.insert(0, file.clone());
-        for gone in files.split_off(FILES_MAX.min(files.len())) {
+        for gone in files.split_off(count_kept(&files)) {
             let _already_gone = std::fs::remove_dir_all(self.directory.join(gone.key));
         }
         replace_file(&self.directory.join("files.json"), &serde_json::to_string(&files)?)?;
         Ok(file)
+    }
+
+    /// Keeps a file that is in memory.
+    ///
+    /// # Errors
+    /// The disk has no room for it, or the folder cannot be written.
+    pub fn add(&self, name: &str, bytes: &[u8], at_ms: i64) -> Result<BroughtFile, ArrivalError> {
+        let mut arriving = self.receive(Some(bytes.len() as u64))?;
+        arriving.append(bytes)?;
+        Ok(self.keep(&arriving, name, at_ms)?)
     }
 
     /// The path of a file; `None` where there is none of this key.
@@ -236,6 +267,16 @@ impl FileDiagnoses {
             file: Some((path, simulated)),
         })
     }
+}
+
+/// How many of the files, newest first, are kept. The newest is, however long it is.
+fn count_kept(files: &[BroughtFile]) -> usize {
+    let mut bytes = 0;
+    let fits = |file: &&BroughtFile| {
+        bytes += file.bytes;
+        bytes <= KEPT_BYTES_MAX
+    };
+    files.iter().take(FILES_MAX).take_while(fits).count().max(1)
 }
 
 /// A name without a path, and not longer than a line.

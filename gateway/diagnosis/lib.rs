@@ -1,6 +1,7 @@
 //! The twin at work: recordings from files and from the history, models from files, what becomes of a diagnosis. What a
 //! diagnosis is stands in `rules::twin`.
 
+pub mod arriving;
 pub mod beside;
 pub mod child;
 pub mod clicked_map;

@@ -3,7 +3,7 @@
 use super::map_file::{MapProposal, verify_proposal};
 use adapter_core::bilingual::Bilingual;
 use recording::Mapping;
-use recording::read::preview_recording;
+use recording::read::{Preview, find_difference, preview_recording};
 use std::path::{Path, PathBuf};
 
 fn build_berlin_map() -> Mapping {
@@ -15,8 +15,24 @@ fn build_berlin_map() -> Mapping {
 fn propose_map(path: &Path, base: &Mapping) -> Option<(String, Option<String>)> {
     let found = preview_recording(path, base).ok()?;
     let text = MapProposal::from_preview(&found, base).to_toml(&Bilingual::default(), "f");
-    let wrong = verify_proposal(path, &text, &found, &[]).err().map(|error| error.to_string());
+    let wrong = match verify_proposal(path, &text, found, &[]) {
+        Ok(after) => is_read_otherwise(path, &text, after),
+        Err(error) => Some(error.to_string()),
+    };
     Some((text, wrong))
+}
+
+/// Rows that were kept from the first reading are those of a second one, with the same notes.
+fn is_read_otherwise(path: &Path, map: &str, after: Preview) -> Option<String> {
+    let mapping = Mapping::parse(map, "map").expect("a map");
+    let again = preview_recording(path, &mapping).expect("readable");
+    match (after.read, again.read) {
+        (Ok(kept), Ok(again)) => find_difference(&kept, &again, &[])
+            .map(|difference| difference.en)
+            .or_else(|| (kept.notes != again.notes).then(|| format!("{:?} is not {:?}", kept.notes, again.notes))),
+        (Err(_), Err(_)) => None,
+        (kept, again) => Some(format!("{:?} is not {:?}", kept.err(), again.err())),
+    }
 }
 
 #[test]
@@ -57,7 +73,7 @@ fn date_and_time_in_two_columns_are_proposed_as_two() {
     // A map under which it reads otherwise is refused.
     let found = preview_recording(&path, &build_berlin_map()).expect("readable");
     let midnight = "schema = \"map/1\"\n[time]\ncolumn = \"Datum\"\nzone = \"Europe/Berlin\"\n";
-    let error = verify_proposal(&path, midnight, &found, &[]).expect_err("midnight").to_string();
+    let error = verify_proposal(&path, midnight, found, &[]).expect_err("midnight").to_string();
     assert!(error.contains("no map is written") && error.contains("data row"), "{error}");
     std::fs::remove_file(&path).expect("removed");
 }

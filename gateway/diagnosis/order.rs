@@ -46,10 +46,11 @@ pub(super) fn order_recordings(mut recordings: Vec<Recording>, copies: Copies) -
     let mut remarks = Vec::new();
     let mut seen = SeenRows::default();
     let mut kept = Vec::new();
-    for recording in recordings {
+    let last = recordings.len().saturating_sub(1);
+    for (index, recording) in recordings.into_iter().enumerate() {
         let rows = match copies {
             Copies::Keep => (0..recording.count_rows()).collect(),
-            Copies::CountOnce => seen.list_new_rows(&recording, &mut remarks),
+            Copies::CountOnce => seen.list_new_rows(&recording, index < last, &mut remarks),
         };
         match rows.len() {
             0 if recording.count_rows() > 0 => {}
@@ -152,8 +153,8 @@ struct SeenRows {
 }
 
 impl SeenRows {
-    /// The rows that have not come before.
-    fn list_new_rows(&mut self, recording: &Recording, remarks: &mut Vec<Bilingual>) -> Vec<usize> {
+    /// The rows that have not come before. They are remembered where others come after them.
+    fn list_new_rows(&mut self, recording: &Recording, others_come: bool, remarks: &mut Vec<Bilingual>) -> Vec<usize> {
         let runs = recording.list_runs();
         let mut kept = Vec::new();
         let mut own = Vec::new();
@@ -171,6 +172,9 @@ impl SeenRows {
             }
         }
         let Some(start_ns) = recording.start_ns else { return kept };
+        if self.rows.is_empty() && !others_come {
+            return kept;
+        }
         let before = kept.len();
         kept.retain(|row| {
             let digest = compute_row_digest(recording, start_ns, *row);
@@ -201,8 +205,11 @@ fn compute_run_digest(recording: &Recording, run: &Run) -> Option<u64> {
     let mut columns: Vec<(&str, &Numbers)> = list_numbers(recording).collect();
     columns.sort_by_key(|(name, _)| *name);
     let varies = |(_, numbers): &(&str, &Numbers)| {
-        let values: HashSet<u64> = run.rows.clone().filter_map(|row| numbers.get(row)).map(f64::to_bits).collect();
-        values.len() >= COPY_VALUES_MIN
+        let mut values = HashSet::new();
+        run.rows.clone().filter_map(|row| numbers.get(row)).any(|value| {
+            values.insert(value.to_bits());
+            values.len() >= COPY_VALUES_MIN
+        })
     };
     if run.rows.len() < COPY_ROWS_MIN || !columns.iter().any(varies) {
         return None;

@@ -6,7 +6,7 @@ use super::clicked_map::ClickedMap;
 use super::map_file::{MapProposal, ProposedColumn};
 use adapter_core::bilingual::Bilingual;
 use gateway_base::files::{read_text, replace_file};
-use gateway_base::limits::{MEMORY_TOLD_MB, PROCESSOR_S, limit_memory_and_time};
+use gateway_base::limits::{MEMORY_TOLD_MB, TimeLimits, limit_memory_and_time};
 use recording::read::{Preview, preview_recording, preview_rows};
 use recording::{Mapping, NoteKind, RecordingError};
 use serde::{Deserialize, Serialize};
@@ -36,7 +36,7 @@ pub struct PreviewJob {
 
 /// The child: reads the file and writes one line.
 pub(super) fn run_job(job: &PreviewJob) -> std::io::Result<()> {
-    limit_memory_and_time()?;
+    limit_memory_and_time(time_limits(&job.preview))?;
     let document = match &job.clicked_map {
         Some(clicked) => propose_map(&job.preview, clicked),
         None => build_document(&job.preview, &job.name),
@@ -44,6 +44,10 @@ pub(super) fn run_job(job: &PreviewJob) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "{document}")?;
     out.flush()
+}
+
+fn time_limits(path: &Path) -> TimeLimits {
+    TimeLimits::from_bytes(std::fs::metadata(path).map_or(0, |file| file.len()))
 }
 
 /// Reads the file in a child and keeps the answer.
@@ -112,17 +116,17 @@ fn ask_child(path: &Path, name: &str, clicked: Option<&ClickedMap>) -> Result<Va
     drop(child.stdin.take());
     let status = child.wait().map_err(broken)?;
     let answer = read.and_then(Result::ok).and_then(|_| serde_json::from_str(&line).ok());
-    answer.ok_or_else(|| describe_end(status))
+    answer.ok_or_else(|| describe_end(status, time_limits(path)))
 }
 
-fn describe_end(status: ExitStatus) -> Bilingual {
+fn describe_end(status: ExitStatus, TimeLimits { processor_s, .. }: TimeLimits) -> Bilingual {
     Bilingual::new(
         format!(
-            "reading it took more than {MEMORY_TOLD_MB} MB of memory or {PROCESSOR_S} s, or broke off ({status}): it is set aside, and read \
+            "reading it took more than {MEMORY_TOLD_MB} MB of memory or {processor_s} s, or broke off ({status}): it is set aside, and read \
              again when it is brought again or its map is changed. Save it as CSV, or in parts"
         ),
         format!(
-            "读取该文件超过{MEMORY_TOLD_MB} MB内存或{PROCESSOR_S}秒，或读取中断（{status}）：已搁置，重新上传或修改映射后才再次读取。请另存为CSV，或分成几个文件"
+            "读取该文件超过{MEMORY_TOLD_MB} MB内存或{processor_s}秒，或读取中断（{status}）：已搁置，重新上传或修改映射后才再次读取。请另存为CSV，或分成几个文件"
         ),
     )
 }

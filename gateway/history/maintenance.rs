@@ -105,7 +105,7 @@ impl Maintenance {
 
     fn update_ceiling(&mut self, used: u64) {
         let Some(room) = disk_room(&self.path) else { return };
-        let keep = self.retention.keep_free_bytes.min(room.total / 10);
+        let keep = self.retention.bytes_kept_free(room);
         if room.free < keep {
             self.ceiling.get_or_insert(used);
         } else if room.free > keep + keep / 4 {

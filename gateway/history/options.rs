@@ -1,6 +1,7 @@
 //! How a history is kept: durability, limits, and the estimates that are stored beside the channels.
 
 use super::outbox::Outbox;
+use super::space::DiskRoom;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_base::clock::ClockMark;
 use std::time::Duration;
@@ -124,6 +125,12 @@ impl Default for Retention {
 }
 
 impl Retention {
+    /// How much of this disk stays free: a tenth of a small one.
+    #[must_use]
+    pub fn bytes_kept_free(&self, room: DiskRoom) -> u64 {
+        self.keep_free_bytes.min(room.total / 10)
+    }
+
     /// The oldest time that an age of `days` still keeps.
     #[must_use]
     pub fn horizon_ns(days: f64, now_ns: TimeNs) -> TimeNs {

@@ -2,7 +2,7 @@
 //! find different things, and what the text names (recordings, models, scripts) is not read in the gateway.
 
 use gateway_base::files::replace_privately;
-use gateway_base::limits::{MEMORY_TOLD_MB, PROCESSOR_S};
+use gateway_base::limits::{MEMORY_TOLD_MB, TimeLimits};
 use gateway_config::Problem;
 use gateway_diagnosis::child::find_own_program;
 use serde::Deserialize;
@@ -51,7 +51,10 @@ fn check_file(file: &Path, name: &str) -> Vec<Problem> {
             failed(format!("no process to check it with: {error}"), "try again; if it stays, start the gateway again")
         }
         Err(what) => failed(
-            format!("checking it took more than {MEMORY_TOLD_MB} MB or {PROCESSOR_S} s, or broke off: {what}"),
+            format!(
+                "checking it took more than {MEMORY_TOLD_MB} MB or {} s, or broke off: {what}",
+                TimeLimits::from_bytes(0).processor_s
+            ),
             "make the recordings and models that it names smaller, or run `cnc-gateway check` at the box",
         ),
     }

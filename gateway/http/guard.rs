@@ -1,11 +1,12 @@
-//! What stands before every route, made from its row of the table: the method, who asks, where the request comes from, the
-//! length and the pace of its body, and afterwards the account of it in the audit.
+//! What stands before every route, made from its row of the table: the method, who asks, where the request comes from, its body
+//! (`body`), and afterwards the account of it in the audit.
 
 use super::ServerState;
+use super::body::{with_body, with_body_in_file};
 use super::peer::Peer;
 use super::person::{SignedIn, find_cookie, name_of_cookie};
 use super::problem::ApiProblem;
-use super::route::{Needs, Route};
+use super::route::{BodyPlace, Needs, Route};
 use axum::body::Body;
 use axum::extract::{Form, FromRequest, Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
@@ -14,11 +15,7 @@ use axum::response::{IntoResponse, Redirect, Response};
 use gateway_access::{Person, Role, SignInError, Token, Urgency};
 use serde::Deserialize;
 use std::time::Duration;
-use thiserror::Error;
-use tokio_stream::StreamExt;
 
-/// A body of the greatest length that any route allows is here within this time, or it is refused.
-const BODY_WITHIN: Duration = Duration::from_secs(10);
 /// An answer begins within this time.
 const ANSWER_WITHIN: Duration = Duration::from_secs(60);
 
@@ -83,7 +80,11 @@ async fn admit_request(Guarded { shared, route }: &Guarded, mut request: Request
             })
             .map_err(refuse)?;
         check_accountability(shared, route).map_err(refuse)?;
-        request = with_body(request, route.body_max()).await.map_err(refuse)?;
+        request = match route.body_place() {
+            BodyPlace::Memory => with_body(request, route.body_max()).await,
+            BodyPlace::File => with_body_in_file(request, route.body_max(), shared).await,
+        }
+        .map_err(refuse)?;
     }
     if let Some(person) = &person {
         request.extensions_mut().insert(SignedIn(person.clone()));
@@ -250,70 +251,9 @@ fn check_accountability(shared: &ServerState, route: &Route) -> Result<(), ApiPr
     }
 }
 
-/// The request with its whole body, which is no longer than `most` bytes and has come in time.
-async fn with_body(request: Request, most: usize) -> Result<Request, ApiProblem> {
-    let (parts, body) = request.into_parts();
-    let announced =
-        parts.headers.get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
-    if announced.is_some_and(|length| length > most as u64) {
-        return Err(ApiProblem::too_large(most));
-    }
-    let bytes = match tokio::time::timeout(BODY_WITHIN, collect_body(body, most)).await {
-        Ok(Ok(bytes)) => bytes,
-        Ok(Err(BodyError::TooLong)) => return Err(ApiProblem::too_large(most)),
-        Ok(Err(error @ BodyError::BrokeOff(_))) => {
-            return Err(ApiProblem::bad_request(error.to_string(), "send it again"));
-        }
-        Err(_) => return Err(ApiProblem::request_timeout(BODY_WITHIN)),
-    };
-    Ok(Request::from_parts(parts, Body::from(bytes)))
-}
-
-/// Why there is no whole body.
-#[derive(Debug, Error)]
-enum BodyError {
-    /// More came than may.
-    #[error("the body is too long")]
-    TooLong,
-    /// The client stopped sending, or sent what is no body.
-    #[error("the body broke off: {0}")]
-    BrokeOff(axum::Error),
-}
-
-/// The whole body, which takes no more memory than it may have bytes.
-async fn collect_body(body: Body, most: usize) -> Result<Vec<u8>, BodyError> {
-    let mut pieces = body.into_data_stream();
-    let mut bytes = Vec::new();
-    while let Some(piece) = pieces.next().await {
-        let piece = piece.map_err(BodyError::BrokeOff)?;
-        if piece.len() > most - bytes.len() {
-            return Err(BodyError::TooLong);
-        }
-        bytes.extend_from_slice(&piece);
-    }
-    debug_assert!(bytes.len() <= most, "each piece was measured before it was taken");
-    Ok(bytes)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[tokio::test]
-    async fn a_body_is_taken_up_to_its_greatest_length() {
-        let pieces = |lengths: &[usize]| {
-            let pieces: Vec<_> = lengths.iter().map(|length| Ok::<_, std::io::Error>(vec![b'a'; *length])).collect();
-            Body::from_stream(tokio_stream::iter(pieces))
-        };
-        for (lengths, fits) in [(&[][..], true), (&[4, 4], true), (&[4, 4, 1], false), (&[9], false)] {
-            let taken = collect_body(pieces(lengths), 8).await;
-            assert_eq!(taken.is_ok(), fits, "{lengths:?}");
-            assert!(fits || matches!(taken, Err(BodyError::TooLong)), "{lengths:?}");
-        }
-        let broken = tokio_stream::iter([Ok(vec![b'a']), Err(std::io::Error::other("length limit"))]);
-        let said = collect_body(Body::from_stream(broken), 8).await.expect_err("broken off");
-        assert_eq!(said.to_string(), "the body broke off: length limit", "what is said decides nothing");
-    }
 
     #[test]
     fn other_sites_change_nothing() {

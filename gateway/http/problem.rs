@@ -71,7 +71,11 @@ impl ApiProblem {
     /// The body is longer than so many bytes: 413.
     #[must_use]
     pub fn too_large(most: usize) -> Self {
-        let title = format!("the body is longer than {most} bytes");
+        let most = match most {
+            most if most > 0 && most % (1 << 20) == 0 => format!("{} MB", most >> 20),
+            most => format!("{most} bytes"),
+        };
+        let title = format!("the body is longer than {most}");
         Self::with_status(StatusCode::PAYLOAD_TOO_LARGE, title, "send less")
     }
 

@@ -53,6 +53,15 @@ pub enum Needs {
     Role(Role),
 }
 
+/// Where the body of a request is when its handler is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum BodyPlace {
+    /// In the request.
+    Memory,
+    /// In a file of the folder of files, which stands in the extensions of the request.
+    File,
+}
+
 /// What answers at a path.
 type Answers = fn() -> MethodRouter<ServerState>;
 
@@ -63,56 +72,71 @@ pub struct Route {
     path: &'static str,
     needs: Needs,
     body_max: usize,
+    body_place: BodyPlace,
     answers: Answers,
     urgency: Urgency,
 }
 
 impl Route {
+    const fn new(verb: Verb, path: &'static str, needs: Needs, body_max: usize, answers: Answers) -> Self {
+        Self { verb, path, needs, body_max, body_place: BodyPlace::Memory, answers, urgency: Urgency::Waits }
+    }
+
     /// `GET` that shows something of the machine or the box.
     #[must_use]
     pub const fn read(path: &'static str, answers: Answers) -> Self {
-        Self { verb: Verb::Get, path, needs: Needs::Reading, body_max: 0, answers, urgency: Urgency::Waits }
+        Self::new(Verb::Get, path, Needs::Reading, 0, answers)
     }
 
     /// `GET` that shows something to persons of this role only.
     #[must_use]
     pub const fn read_by(role: Role, path: &'static str, answers: Answers) -> Self {
-        Self { verb: Verb::Get, path, needs: Needs::Role(role), body_max: 0, answers, urgency: Urgency::Waits }
+        Self::new(Verb::Get, path, Needs::Role(role), 0, answers)
     }
 
     /// `GET` of something that says nothing of the machine: a file of the page, the health of the box.
     #[must_use]
     pub const fn for_file(path: &'static str, answers: Answers) -> Self {
-        Self { verb: Verb::Get, path, needs: Needs::Nothing, body_max: 0, answers, urgency: Urgency::Waits }
+        Self::new(Verb::Get, path, Needs::Nothing, 0, answers)
     }
 
     /// `POST` by a person of at least this role, with a body of at most so many bytes.
     #[must_use]
     pub const fn post(role: Role, path: &'static str, body_max: usize, answers: Answers) -> Self {
-        Self { verb: Verb::Post, path, needs: Needs::Role(role), body_max, answers, urgency: Urgency::Waits }
+        Self::new(Verb::Post, path, Needs::Role(role), body_max, answers)
     }
 
     /// `PUT` by a person of at least this role, with a body of at most so many bytes.
     #[must_use]
     pub const fn put(role: Role, path: &'static str, body_max: usize, answers: Answers) -> Self {
-        Self { verb: Verb::Put, path, needs: Needs::Role(role), body_max, answers, urgency: Urgency::Waits }
+        Self::new(Verb::Put, path, Needs::Role(role), body_max, answers)
     }
 
     /// `DELETE` by a person of at least this role, with a body of at most so many bytes.
     #[must_use]
     pub const fn delete(role: Role, path: &'static str, body_max: usize, answers: Answers) -> Self {
-        Self { verb: Verb::Delete, path, needs: Needs::Role(role), body_max, answers, urgency: Urgency::Waits }
+        Self::new(Verb::Delete, path, Needs::Role(role), body_max, answers)
     }
 
     /// The one `POST` that nobody can be signed in for: signing in itself.
     pub(super) const fn sign_in(path: &'static str, body_max: usize, answers: Answers) -> Self {
-        Self { verb: Verb::Post, path, needs: Needs::Nothing, body_max, answers, urgency: Urgency::Waits }
+        Self::new(Verb::Post, path, Needs::Nothing, body_max, answers)
     }
 
     /// The same for whoever gives the machine back to its dial: nobody is made to wait.
     #[must_use]
     pub const fn gives_back(self) -> Self {
         Self { urgency: Urgency::GivesBack, ..self }
+    }
+
+    /// The same with a body that is too long for the memory.
+    pub(super) const fn with_body_in_file(self) -> Self {
+        Self { body_place: BodyPlace::File, ..self }
+    }
+
+    /// Where its handler finds the body.
+    pub(super) const fn body_place(&self) -> BodyPlace {
+        self.body_place
     }
 
     /// May whoever asks be made to wait?

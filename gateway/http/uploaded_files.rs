@@ -12,26 +12,30 @@ use crate::gallery;
 use adapters::channel::CHANNELS;
 use adapters::recording::TEXT_COLUMNS;
 use axum::Json;
-use axum::body::Bytes;
-use axum::extract::{Path, Query as Pairs, State};
+use axum::extract::{Extension, Path, Query as Pairs, State};
 use axum::response::Response;
 use axum::routing::{delete, get, post, put};
 use gateway_access::Role;
+use gateway_diagnosis::arriving::{ArrivalError, ArrivingFile};
 use gateway_diagnosis::clicked_map::ClickedMap;
 use gateway_diagnosis::files::{BroughtFile, FileDiagnoses, FileDiagnosis, MapRefusal};
 use gateway_diagnosis::handle::DiagnosisHandle;
 use gateway_diagnosis::model_new::{KINDS, MATERIALS, ModelKind, NewModel};
 use serde::Deserialize;
 use serde_json::{Value, json};
+use std::sync::Arc;
+use std::time::Duration;
 
 /// The longest file that is taken; a longer one is read on the command line.
-const FILE_MAX: usize = 32 << 20;
+const FILE_MAX: usize = 200 << 20;
+/// So long a request waits until a file is read; afterwards it says that it is being read.
+const READING_WAIT: Duration = Duration::from_secs(30);
 /// A map, or the choice of a model.
 const BODY_MAX: usize = 256 << 10;
 
 pub(super) const ROUTES: &[Route] = &[
     Route::read("/api/v1/files", || get(serve_files)),
-    Route::post(Role::Setter, "/api/v1/files", FILE_MAX, || post(upload_file)),
+    Route::post(Role::Setter, "/api/v1/files", FILE_MAX, || post(upload_file)).with_body_in_file(),
     Route::read("/api/v1/files/{key}", || get(serve_file)),
     Route::put(Role::Setter, "/api/v1/files/{key}/map", BODY_MAX, || put(map)),
     Route::post(Role::Setter, "/api/v1/files/{key}/diagnosis", BODY_MAX, || post(begin_file_diagnosis)),
@@ -49,7 +53,15 @@ impl ServerState {
 }
 
 fn describe_io_error(error: std::io::Error) -> ApiProblem {
-    ApiProblem::unavailable(format!("the file cannot be kept: {error}"), "look at the data directory")
+    describe_arrival_error(error.into())
+}
+
+pub(super) fn describe_arrival_error(error: ArrivalError) -> ApiProblem {
+    let hint = match error {
+        ArrivalError::NoRoom { .. } => "make room on the disk of the data directory, or bring a shorter file",
+        ArrivalError::Io(_) => "look at the data directory",
+    };
+    ApiProblem::unavailable(error.to_string(), hint)
 }
 
 /// `GET /api/v1/files`: what was brought, what was found, and what can be chosen.
@@ -70,6 +82,7 @@ async fn serve_files(State(shared): State<ServerState>) -> Result<Json<Value>, A
         Ok(Json(json!({
             "schema": "files/1", "files": files.list_files(), "diagnoses": results, "kinds": kinds, "materials": materials,
             "columns": columns, "text_columns": TEXT_COLUMNS, "examples": examples, "bytes_max": FILE_MAX,
+            "bytes_free": files.find_free_bytes(),
         })))
     })
     .await
@@ -93,18 +106,17 @@ async fn upload_file(
     State(shared): State<ServerState>,
     SignedIn(_): SignedIn,
     Pairs(pairs): Pairs<Vec<(String, String)>>,
-    bytes: Bytes,
+    Extension(arrived): Extension<Arc<ArrivingFile>>,
 ) -> Result<Response, ApiProblem> {
     let name = QueryKeys::from_pairs(pairs, &["name"])?.find_text("name").unwrap_or("recording").to_owned();
-    if bytes.is_empty() {
+    if arrived.bytes() == 0 {
         return Err(ApiProblem::bad_request("the file is empty", "choose another one"));
     }
     let files = shared.require_files()?.clone();
     let at_ms = now_ms(&shared);
-    let file: BroughtFile = run_blocking(move || files.add(&name, &bytes, at_ms).map_err(describe_io_error)).await?;
+    let file: BroughtFile = run_blocking(move || files.keep(&arrived, &name, at_ms).map_err(describe_io_error)).await?;
     let words = format!("a file for a diagnosis: {} ({} bytes)", file.name, file.bytes);
-    let files = shared.require_files()?.clone();
-    let document = run_blocking(move || build_file_document(&files, &file.key)).await?;
+    let document = describe_file(&shared, file.key).await?;
     Ok(with_audit_note(Json(document), words))
 }
 
@@ -114,16 +126,25 @@ fn now_ms(shared: &ServerState) -> i64 {
 
 /// `GET /api/v1/files/{key}`: how it is understood.
 async fn serve_file(State(shared): State<ServerState>, Path(key): Path<String>) -> Result<Json<Value>, ApiProblem> {
-    let files = shared.require_files()?.clone();
-    run_blocking(move || build_file_document(&files, &key).map(Json)).await
+    describe_file(&shared, key).await.map(Json)
 }
 
-fn build_file_document(files: &FileDiagnoses, key: &str) -> Result<Value, ApiProblem> {
+/// How a file is understood. A long one takes its time: until it is read, or while others are, `reading` says so.
+async fn describe_file(shared: &ServerState, key: String) -> Result<Value, ApiProblem> {
+    let files = shared.require_files()?.clone();
     let gone = || ApiProblem::not_found(&format!("a file {key:?} (the newest 20 are kept)"));
-    let file = files.list_files().into_iter().find(|file| file.key == key).ok_or_else(gone)?;
-    let busy = |_| ApiProblem::unavailable("other files are being read", "ask again in some seconds");
-    let understood = files.describe_file(&file).map_err(busy)?;
+    let listed = files.clone();
+    let known = run_blocking(move || Ok(listed.list_files())).await?;
+    let file = known.into_iter().find(|file| file.key == key).ok_or_else(gone)?;
     let mut document = json!({ "schema": "file/1", "key": key, "name": file.name, "bytes": file.bytes });
+    // It goes on being read when this request is over, and is understood when it is asked for again.
+    let read = run_blocking(move || Ok(files.describe_file(&file)));
+    let understood = match tokio::time::timeout(READING_WAIT, read).await {
+        Ok(Ok(Ok(understood))) => understood,
+        Ok(Err(problem)) => return Err(problem),
+        // Other files are being read, or this one still is.
+        Ok(Ok(Err(_))) | Err(_) => json!({ "reading": true, "columns": [] }),
+    };
     if let (Value::Object(document), Value::Object(understood)) = (&mut document, understood) {
         document.extend(understood);
     }
@@ -139,7 +160,8 @@ async fn map(
 ) -> Result<Response, ApiProblem> {
     let files = shared.require_files()?.clone();
     let words = format!("file {key}: its map");
-    let document = run_blocking(move || {
+    let mapped = key.clone();
+    run_blocking(move || {
         let refuse = |text: String| ApiProblem::bad_request(text, "change the choice that is named");
         let file = files.list_files().into_iter().find(|file| file.key == key);
         let file = file.ok_or_else(|| ApiProblem::not_found(&format!("a file {key:?}")))?;
@@ -148,10 +170,10 @@ async fn map(
             MapRefusal::Busy => ApiProblem::unavailable("other files are being read", "ask again in some seconds"),
             MapRefusal::Refused(why) => refuse(why),
         })?;
-        files.set_map(&path, &toml).map_err(describe_io_error)?;
-        build_file_document(&files, &key)
+        files.set_map(&path, &toml).map_err(describe_io_error)
     })
     .await?;
+    let document = describe_file(&shared, mapped).await?;
     Ok(with_audit_note(Json(document), words))
 }
 
@@ -277,7 +299,7 @@ async fn diagnose_example(
     let at_ms = now_ms(&shared);
     let file = {
         let files = files.clone();
-        run_blocking(move || files.add(it.file, it.recording, at_ms).map_err(describe_io_error)).await?
+        run_blocking(move || files.add(it.file, it.recording, at_ms).map_err(describe_arrival_error)).await?
     };
     let path = files.find_path(&file.key).ok_or_else(|| ApiProblem::not_found("the example"))?;
     files

@@ -45,25 +45,46 @@ export function table(head, rows, { caption } = {}) {
   return box;
 }
 
-/** A question to the box: JSON, or an error in its words. */
-export async function ask(path, options) {
-  const answer = await fetch(path, options);
-  const text = await answer.text();
+/** The answer of the box as JSON, or an error in its words. */
+function understand(status, text, otherwise) {
   let document;
   try {
     document = JSON.parse(text);
   } catch {
-    document = { title: text || answer.statusText };
+    document = { title: text || otherwise };
   }
   // A session that is over: the frame asks who is signed in now.
-  if (answer.status === 401) dispatchEvent(new Event("signed-out"));
-  if (!answer.ok)
-    throw Object.assign(new Error([document.title, document.hint].filter(Boolean).join(" – ")), {
-      status: answer.status,
-      document,
-    });
+  if (status === 401) dispatchEvent(new Event("signed-out"));
+  if (status < 200 || status > 299)
+    throw Object.assign(new Error([document.title, document.hint].filter(Boolean).join(" – ")), { status, document });
   return document;
 }
+
+/** A question to the box: JSON, or an error in its words. */
+export async function ask(path, options) {
+  const answer = await fetch(path, options);
+  return understand(answer.status, await answer.text(), answer.statusText);
+}
+
+/** Brings a file to the box. `told` hears which share of it has gone; `signal` ends it. `broken` and `ended` are what is said then. */
+export const bring = (path, file, { told, signal, broken, ended }) =>
+  new Promise((resolve, reject) => {
+    const request = new XMLHttpRequest();
+    request.open("POST", path);
+    request.setRequestHeader("content-type", "application/octet-stream");
+    request.upload.addEventListener("progress", (event) => told(event.total ? event.loaded / event.total : 0));
+    request.addEventListener("load", () => {
+      try {
+        resolve(understand(request.status, request.responseText, request.statusText));
+      } catch (error) {
+        reject(error);
+      }
+    });
+    request.addEventListener("error", () => reject(new Error(broken)));
+    request.addEventListener("abort", () => reject(new Error(ended)));
+    signal.addEventListener("abort", () => request.abort());
+    request.send(file);
+  });
 
 /** A change: JSON to the box. */
 export const send = (path, body, method = "POST") =>

@@ -4,8 +4,9 @@
 use adapter_core::bilingual::Bilingual;
 use recording::{Cells, OF_OTHER_ROWS, Recording, derive_quantity};
 
-/// Rows that are compared, at most: ten kilobytes each are six hundred megabytes. Of fewer nothing is left out.
-const ROWS_MAX: usize = 60_000;
+/// Rows that are compared, at most: a shift of eight hours at one row in a second. Ten kilobytes each are three hundred megabytes, which the
+/// process has that diagnoses a file. Of fewer nothing is left out.
+const ROWS_MAX: usize = 30_000;
 
 /// The rows that are compared.
 #[derive(Debug)]

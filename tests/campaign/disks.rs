@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 use testkit::process::{Gateway, wait_for};
+use testkit::small_disk::start_on_tmpfs;
 
 /// A box at sixty times the pace of a machine, so that its file grows.
 struct Running {
@@ -151,26 +152,6 @@ pub(crate) fn endless_reader(_: &Scale) -> Row {
     row
 }
 
-/// A box on a tmpfs of its own, and the way to it.
-pub(crate) fn on_tmpfs(megabytes: usize, arguments: &[&str]) -> Option<(tempfile::TempDir, Gateway, PathBuf)> {
-    let directory = tempfile::tempdir().expect("a directory");
-    let disk = directory.path().join("data");
-    fs::create_dir(&disk).expect("a directory");
-    let script = format!("mount -t tmpfs -o size={megabytes}m tmpfs \"$1\" && shift && exec \"$@\"");
-    let possible = Command::new("unshare").args(["-rm", "sh", "-c", "mount -t tmpfs tmpfs /mnt"]).status();
-    if !possible.is_ok_and(|status| status.success()) {
-        return None;
-    }
-    let mut command = Command::new("unshare");
-    command.args(["-rm", "sh", "-c", &script, "sh"]).arg(&disk).arg(env!("CARGO_BIN_EXE_cnc-gateway"));
-    command.args(["run", "--listen", "127.0.0.1:0", "--data-dir"]).arg(&disk).args(arguments);
-    let gateway = Gateway::spawn(command);
-    // The disk is in a name space of its own; this is the way to it.
-    let inside = Path::new("/proc").join(gateway.pid().to_string()).join("root");
-    let inside = inside.join(disk.strip_prefix("/").expect("absolute"));
-    Some((directory, gateway, inside))
-}
-
 /// Fills a disk to its last byte.
 pub(crate) fn fill(disk: &Path) -> PathBuf {
     let path = disk.join("hog");
@@ -183,7 +164,9 @@ pub(crate) fn fill(disk: &Path) -> PathBuf {
 pub(crate) fn full(scale: &Scale) -> Row {
     let mut row =
         Row::new("a tmpfs of 24 MB filled for 15 s and freed, again and again; rows the status had acknowledged");
-    let Some((_directory, mut gateway, disk)) = on_tmpfs(24, &["--speed", "10"]) else { return Row::skipped(row.how) };
+    let Some((_directory, mut gateway, disk)) = start_on_tmpfs(24, &["--speed", "10"]) else {
+        return Row::skipped(row.how);
+    };
     let address = gateway.address();
     let history = || status(&address).map(|status| status["history"].clone()).unwrap_or_default();
     let rows = || history()["rows"].as_u64().unwrap_or(0);

@@ -17,5 +17,6 @@ pub mod process;
 pub mod process_status;
 pub mod scoring;
 pub mod served;
+pub mod small_disk;
 pub mod thermal_machine;
 pub mod weights;

@@ -10,6 +10,7 @@ use super::mapping::Mapping;
 use super::plan::{BlockPlan, Note, NoteKind, TimeKind};
 use super::restart::name_runs;
 use super::row_class::{RowClass, classify_row};
+use super::row_times::{RawTimes, RowLines};
 use super::table::{Row, Table, VisitStep};
 use super::time::{RawTime, resolve_times};
 use crate::{Cells, Recording};
@@ -148,8 +149,8 @@ struct BlockBuilder<'p> {
     plan: &'p BlockPlan,
     /// Rows that came by, used or not.
     rows: u64,
-    lines: Vec<u32>,
-    times: Vec<RawTime>,
+    lines: RowLines,
+    times: RawTimes,
     columns: Vec<ColumnBuilder<'p>>,
     /// Rows without a time since the last one that had one: the end of the file says whether they are a footer.
     problems: Vec<RowProblem>,
@@ -161,8 +162,8 @@ impl<'p> BlockBuilder<'p> {
         Self {
             plan,
             rows: 0,
-            lines: Vec::new(),
-            times: Vec::new(),
+            lines: RowLines::default(),
+            times: RawTimes::default(),
             columns: plan.columns.iter().map(ColumnBuilder::new).collect(),
             problems: Vec::new(),
             has_new_word: false,
@@ -185,10 +186,6 @@ impl<'p> BlockBuilder<'p> {
                 return self.problems.push(RowProblem { line, column, reason });
             }
         };
-        let Ok(stored_line) = u32::try_from(line) else {
-            let reason = format!("only the first {} lines of a file are read", u32::MAX);
-            return done.record_refusal(RowProblem { line, column: None, reason });
-        };
         std::mem::take(&mut self.problems).into_iter().for_each(|problem| done.record_refusal(problem));
         for builder in &mut self.columns {
             let index = builder.plan.index;
@@ -199,7 +196,7 @@ impl<'p> BlockBuilder<'p> {
         for builder in &mut self.columns {
             self.has_new_word |= builder.push(line, row.cell_at(builder.plan.index));
         }
-        self.lines.push(stored_line);
+        self.lines.push(line);
         self.times.push(time);
     }
 
@@ -281,7 +278,7 @@ impl<'p> BlockBuilder<'p> {
     }
 
     fn finish_recording(self, file: &str, mapping: &Mapping, done: &mut Assembled) -> Recording {
-        if self.problems.len() <= FOOTER_MAX && !self.problems.is_empty() && !self.times.is_empty() {
+        if self.problems.len() <= FOOTER_MAX && !self.problems.is_empty() && self.times.len() > 0 {
             let (lines, first) = (self.problems.len(), self.problems[0].line);
             done.notes.push(Note::new(
                 NoteKind::Loss,
@@ -292,12 +289,12 @@ impl<'p> BlockBuilder<'p> {
             self.problems.into_iter().for_each(|problem| done.record_refusal(problem));
         }
         let runs = self.columns.iter().find(|column| column.plan.name == "run").map(|column| &column.words);
-        let timed = resolve_times(&self.times, runs, &mapping.time, &mut done.notes);
-        let restarts = timed.restarts;
         let mut kept = vec![true; self.times.len()];
+        let timed = resolve_times(self.times, runs, &mapping.time, &mut done.notes);
+        let restarts = timed.restarts;
         for (row, reason) in timed.out_of_order {
             kept[row] = false;
-            let line = u64::from(self.lines[row]);
+            let line = self.lines.line_of(row);
             done.record_refusal(RowProblem { line, column: Some(self.plan.time.source.clone()), reason });
         }
         let all = kept.iter().all(|kept| *kept);
@@ -307,8 +304,10 @@ impl<'p> BlockBuilder<'p> {
             (Some(start_ns), Some(first_s)) => (Some(start_ns + to_nanoseconds(*first_s)), *first_s),
             (start_ns, _) => (start_ns, 0.0),
         };
-        let time_s =
-            timed.time_s.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(time_s, _)| time_s - shift_s).collect();
+        let mut time_s = timed.time_s;
+        let mut is_kept = kept.iter();
+        time_s.retain(|_| is_kept.next().is_none_or(|kept| *kept));
+        time_s.iter_mut().for_each(|time_s| *time_s -= shift_s);
         let mut recording = Recording::new(file, time_s, start_ns);
         for column in self.columns {
             column.loss_note(&mut done.notes);

@@ -106,6 +106,19 @@ pub struct MappingError {
 }
 
 impl Mapping {
+    /// What it says besides the columns and their clocks: how the file is opened, and what becomes of the times of its rows.
+    pub(super) fn without_plan(&self) -> Self {
+        let TimeMapping { zone, clocks, set_back, .. } = self.time.clone();
+        Self {
+            schema: String::new(),
+            decimal: None,
+            time: TimeMapping { zone, clocks, set_back, ..TimeMapping::default() },
+            column: Vec::new(),
+            clock: Vec::new(),
+            ..self.clone()
+        }
+    }
+
     /// Reads a map from its text.
     ///
     /// # Errors

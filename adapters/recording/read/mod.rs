@@ -14,7 +14,7 @@
 //! | `long` | one line for each value, turned into columns |
 //! | `cell`, `plain_number`, `cell_unit`, `moment`, `compact_moment` | what one cell may be |
 //! | `survey`, `understand`, `targets`, `clock`, `numeric_time`, `names` | what a column is |
-//! | `row_class`, `one_pass`, `assemble`, `column_builder`, `time`, `restart`, `merge` | rows, time, tests one after the other, several clocks in one file |
+//! | `row_class`, `one_pass`, `assemble`, `column_builder`, `row_times`, `time`, `restart`, `merge` | rows, time, tests one after the other, several clocks in one file |
 //! | `preview` | how a file is understood, for a person and for a map |
 //! | `limits` | how much is taken at most |
 
@@ -44,6 +44,7 @@ pub(super) mod plan;
 mod preview;
 mod restart;
 mod row_class;
+mod row_times;
 mod splitter;
 mod survey;
 pub(super) mod table;
@@ -66,6 +67,7 @@ use one_pass::{CountedTable, count_cells};
 use plan::{Note, NoteKind, ReadPlan};
 use std::io::Read;
 use std::path::Path;
+use survey::Survey;
 use table::Table;
 
 /// What was read, and what was refused.
@@ -132,14 +134,17 @@ pub fn read_csv(mut input: impl Read, file: &str) -> Result<ReadRecording, Recor
 
 fn read_input(input: Input, mapping: &Mapping) -> Result<ReadRecording, RecordingError> {
     let file = input.file.clone();
-    let UnderstoodTable { table, head, plan, recordings } = understand_input(input, mapping)?;
-    read_planned(table.as_ref(), &head, &plan?, recordings, mapping, &file)
+    let UnderstoodTable { table, head, plan, recordings, .. } = understand_input(input, mapping)?;
+    let plan = plan?;
+    let rows = read_planned(table.as_ref(), &head, &plan, recordings, mapping, &file)?;
+    Ok(rows.with_notes(&plan.notes))
 }
 
 /// A table and how it is to be read.
 struct UnderstoodTable {
     table: Box<dyn Table>,
     head: Head,
+    survey: Survey,
     plan: Result<ReadPlan, RecordingError>,
     /// Its rows under this plan, where they have been taken already.
     recordings: Option<Assembled>,
@@ -148,8 +153,9 @@ struct UnderstoodTable {
 impl UnderstoodTable {
     fn new(table: Box<dyn Table>, head: Head, counted: CountedTable, mapping: &Mapping, file: &str) -> Self {
         let plan = understand::build_plan(&head, &counted.survey, mapping, file);
-        let recordings = plan.as_ref().ok().and_then(|plan| counted.take_rows(&plan.blocks));
-        Self { table, head, plan, recordings }
+        let CountedTable { survey, rows } = counted;
+        let recordings = plan.as_ref().ok().and_then(|plan| rows?.take_under(&plan.blocks));
+        Self { table, head, survey, plan, recordings }
     }
 }
 
@@ -167,7 +173,37 @@ fn understand_input(input: Input, mapping: &Mapping) -> Result<UnderstoodTable, 
     Ok(UnderstoodTable::new(table, head, counted, mapping, &file))
 }
 
-/// Rows and notes of a table under its plan.
+/// The rows of a table under a plan, and what is to be said of them besides the notes of the plan.
+#[derive(Debug)]
+struct PlannedRows {
+    recording: Recording,
+    problems: Vec<RowProblem>,
+    refused: u64,
+    /// How the table is written,
+    form: Vec<Note>,
+    /// and what was met among its rows.
+    met: Vec<Note>,
+}
+
+impl PlannedRows {
+    fn with_notes(self, of_plan: &[Note]) -> ReadRecording {
+        let notes = join_notes([&self.form, of_plan, &self.met]);
+        ReadRecording { recording: self.recording, problems: self.problems, refused: self.refused, notes }
+    }
+}
+
+/// Notes about the form of a file, its columns and its rows. The same of every clock of the file is said once.
+fn join_notes(parts: [&[Note]; 3]) -> Vec<Note> {
+    let mut notes: Vec<Note> = Vec::new();
+    for note in parts.into_iter().flatten() {
+        if !notes.contains(note) {
+            notes.push(note.clone());
+        }
+    }
+    notes
+}
+
+/// Rows of a table under its plan.
 fn read_planned(
     table: &dyn Table,
     head: &Head,
@@ -175,29 +211,20 @@ fn read_planned(
     assembled: Option<Assembled>,
     mapping: &Mapping,
     file: &str,
-) -> Result<ReadRecording, RecordingError> {
+) -> Result<PlannedRows, RecordingError> {
     let mut done = match assembled {
         Some(done) => done,
         None => assemble::assemble_recordings(table, head, &plan.blocks, mapping, file)?,
     };
     let together = mapping.time.clocks.as_deref() == Some("rows");
-    let mut notes: Vec<Note> =
+    let mut form: Vec<Note> =
         table.describe_form().into_iter().map(|text| Note { kind: NoteKind::Assumption, text }).collect();
-    notes.extend(table.list_notes());
-    notes.extend(plan.notes.iter().cloned());
+    form.extend(table.list_notes());
     let recording = merge::merge_blocks(std::mem::take(&mut done.blocks), together, &mut done.notes);
-    notes.extend(done.notes);
-    // The same of every clock of the file is said once.
-    let mut said: Vec<Note> = Vec::new();
-    for note in notes {
-        if !said.contains(&note) {
-            said.push(note);
-        }
-    }
     if recording.count_rows() == 0 {
         return Err(RecordingError::Empty { file: file.to_owned(), problems: done.problems });
     }
-    Ok(ReadRecording { recording, problems: done.problems, refused: done.refused, notes: said })
+    Ok(PlannedRows { recording, problems: done.problems, refused: done.refused, form, met: done.notes })
 }
 
 #[cfg(test)]

@@ -18,19 +18,19 @@ const GUESS_ROWS: usize = 400;
 /// A whole table, counted.
 pub(super) struct CountedTable {
     pub(super) survey: Survey,
-    rows: Option<TakenRows>,
+    pub(super) rows: Option<TakenRows>,
 }
 
 /// The rows of a table under a guess.
-struct TakenRows {
+pub(super) struct TakenRows {
     guess: Vec<BlockPlan>,
     recordings: Assembled,
 }
 
-impl CountedTable {
+impl TakenRows {
     /// The rows, where the plan is the one that was guessed.
-    pub(super) fn take_rows(self, blocks: &[BlockPlan]) -> Option<Assembled> {
-        self.rows.filter(|rows| rows.guess == blocks).map(|rows| rows.recordings)
+    pub(super) fn take_under(self, blocks: &[BlockPlan]) -> Option<Assembled> {
+        (self.guess == blocks).then_some(self.recordings)
     }
 }
 

@@ -13,10 +13,10 @@ fn read_in_two_passes(input: Input, mapping: &Mapping) -> Result<ReadRecording, 
         let head = head::find_head(&turned, head::GivenHead::default(), &file)?;
         let survey = survey::survey_table(&turned, &head)?;
         let plan = understand::build_plan(&head, &survey, mapping, &file)?;
-        return read_planned(&turned, &head, &plan, None, mapping, &file);
+        return Ok(read_planned(&turned, &head, &plan, None, mapping, &file)?.with_notes(&plan.notes));
     }
     let plan = understand::build_plan(&head, &survey, mapping, &file)?;
-    read_planned(table.as_ref(), &head, &plan, None, mapping, &file)
+    Ok(read_planned(table.as_ref(), &head, &plan, None, mapping, &file)?.with_notes(&plan.notes))
 }
 
 /// What differs between both ways; `None` where nothing does.

@@ -1,11 +1,14 @@
 //! How a file is understood, before anything is done with it: each column with what it becomes, what else it may be, and its first values.
 
 use super::error::RecordingError;
+use super::head::Head;
 use super::input::Input;
 use super::mapping::Mapping;
 use super::names::ForeignName;
-use super::plan::TimePlan;
-use super::{ReadRecording, UnderstoodTable, read_planned, understand_input};
+use super::plan::{BlockPlan, Note, ReadPlan, TimePlan};
+use super::survey::Survey;
+use super::understand::build_plan;
+use super::{ReadRecording, UnderstoodTable, join_notes, read_planned, understand_input};
 use crate::{Cells, Column, Recording};
 use adapter_core::bilingual::Bilingual;
 use std::path::Path;
@@ -47,6 +50,45 @@ pub struct Preview {
     pub time: TimePreview,
     /// The file as read, or why it cannot be.
     pub read: Result<ReadRecording, RecordingError>,
+    basis: Option<PreviewBasis>,
+}
+
+/// What the rows of a preview follow from: the cells that were counted, and what was made of them.
+#[derive(Debug)]
+struct PreviewBasis {
+    file: String,
+    mapping: Mapping,
+    head: Head,
+    survey: Survey,
+    blocks: Vec<BlockPlan>,
+    form: Vec<Note>,
+    met: Vec<Note>,
+}
+
+impl PreviewBasis {
+    /// What is made of the counted cells under another map; `None` where its rows may be others.
+    fn plan_same_rows(&self, mapping: &Mapping) -> Option<ReadPlan> {
+        let opens_alike = self.mapping.without_plan() == mapping.without_plan();
+        let plan = opens_alike.then(|| build_plan(&self.head, &self.survey, mapping, &self.file).ok())??;
+        (plan.blocks == self.blocks).then_some(plan)
+    }
+}
+
+impl Preview {
+    /// The file under another map, without reading it again.
+    ///
+    /// # Errors
+    /// The preview as it is, where another reading may come to other rows.
+    pub fn keep_rows_under(mut self, mapping: &Mapping) -> Result<Self, Box<Self>> {
+        let Some((basis, plan)) = self.basis.as_ref().and_then(|basis| Some((basis, basis.plan_same_rows(mapping)?)))
+        else {
+            return Err(Box::new(self));
+        };
+        if let Ok(read) = &mut self.read {
+            read.notes = join_notes([&basis.form, &plan.notes, &basis.met]);
+        }
+        Ok(self)
+    }
 }
 
 /// Looks at a file under a map.
@@ -56,14 +98,27 @@ pub struct Preview {
 pub fn preview_recording(path: &Path, mapping: &Mapping) -> Result<Preview, RecordingError> {
     let input = Input::from_path(path);
     let file = input.file.clone();
-    let UnderstoodTable { table, head, plan, recordings } = understand_input(input, mapping)?;
-    let (blocks, read) = match plan {
-        Ok(plan) => {
-            let read = read_planned(table.as_ref(), &head, &plan, recordings, mapping, &file);
-            (plan.blocks, read)
-        }
-        Err(error) => (Vec::new(), Err(error)),
+    let UnderstoodTable { table, head, survey, plan, recordings } = understand_input(input, mapping)?;
+    let plan = match plan {
+        Ok(plan) => plan,
+        Err(error) => return Ok(describe_columns(&head, &[], Err(error))),
     };
+    let rows = read_planned(table.as_ref(), &head, &plan, recordings, mapping, &file);
+    let said = rows.as_ref().map(|rows| (rows.form.clone(), rows.met.clone())).ok();
+    let preview = describe_columns(&head, &plan.blocks, rows.map(|rows| rows.with_notes(&plan.notes)));
+    let basis = said.map(|(form, met)| PreviewBasis {
+        file,
+        mapping: mapping.clone(),
+        head,
+        survey,
+        blocks: plan.blocks,
+        form,
+        met,
+    });
+    Ok(Preview { basis, ..preview })
+}
+
+fn describe_columns(head: &Head, blocks: &[BlockPlan], read: Result<ReadRecording, RecordingError>) -> Preview {
     let names = &head.names;
     let columns = (0..names.len())
         .map(|index| {
@@ -81,7 +136,7 @@ pub fn preview_recording(path: &Path, mapping: &Mapping) -> Result<Preview, Reco
         })
         .collect();
     let time = blocks.first().map_or_else(TimePreview::default, |block| preview_time(names, &block.time));
-    Ok(Preview { columns, time, read })
+    Preview { columns, time, read, basis: None }
 }
 
 /// A name that stands there once says which column is meant; a column of time that is repeated is a clock of its own each time.

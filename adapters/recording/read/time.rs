@@ -4,6 +4,7 @@ use super::mapping::TimeMapping;
 use super::merge::usual_step;
 use super::plan::{Note, NoteKind};
 use super::restart::{divide_at, note_restarts};
+use super::row_times::{RawTimes, TimeSort};
 use crate::Words;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use jiff::tz::{AmbiguousOffset, TimeZone};
@@ -41,12 +42,13 @@ const CLOCK_CHANGE_S: f64 = 3600.0;
 
 /// Turns the cells of a whole column into time.
 pub(super) fn resolve_times(
-    raw: &[RawTime],
+    raw: RawTimes,
     runs: Option<&Words>,
     mapping: &TimeMapping,
     notes: &mut Vec<Note>,
 ) -> Timed {
-    let mut timed = if raw.iter().any(|time| matches!(time, RawTime::Utc(_) | RawTime::Local(_))) {
+    let rows = raw.len();
+    let mut timed = if raw.has(TimeSort::Utc) || raw.has(TimeSort::Local) {
         resolve_moments(raw, mapping, notes)
     } else {
         Timed { time_s: to_seconds(raw, notes), ..Timed::default() }
@@ -55,9 +57,9 @@ pub(super) fn resolve_times(
     if mapping.set_back.as_deref() == Some("join") {
         join_set_back(&mut timed.time_s, notes);
     }
-    let mut stretches = time_stretches(raw.len(), runs.filter(|_| !is_absolute));
+    let mut stretches = time_stretches(rows, runs.filter(|_| !is_absolute));
     if mapping.set_back.as_deref() == Some("run") {
-        timed.restarts = (1..raw.len()).filter(|row| timed.time_s[*row] < timed.time_s[row - 1]).collect();
+        timed.restarts = (1..rows).filter(|row| timed.time_s[*row] < timed.time_s[row - 1]).collect();
         note_restarts(timed.restarts.len(), notes);
         stretches = divide_at(stretches, &timed.restarts);
     }
@@ -92,15 +94,13 @@ fn in_seconds(ns: i64) -> f64 {
     ns as f64 / SECOND_NS as f64
 }
 
-fn to_seconds(raw: &[RawTime], notes: &mut Vec<Note>) -> Vec<f64> {
-    let mut times: Vec<f64> = raw
-        .iter()
-        .map(|time| match time {
-            RawTime::Seconds(seconds) => *seconds,
-            RawTime::OfDay(ns) | RawTime::Utc(ns) | RawTime::Local(ns) => in_seconds(*ns),
-        })
-        .collect();
-    if raw.iter().any(|time| matches!(time, RawTime::OfDay(_))) {
+fn to_seconds(raw: RawTimes, notes: &mut Vec<Note>) -> Vec<f64> {
+    let has_times_of_day = raw.has(TimeSort::OfDay);
+    let mut times: Vec<f64> = raw.map(|time| match time {
+        RawTime::Seconds(seconds) => seconds,
+        RawTime::OfDay(ns) | RawTime::Utc(ns) | RawTime::Local(ns) => in_seconds(ns),
+    });
+    if has_times_of_day {
         let mut days = 0.0;
         for row in 1..times.len() {
             // Half a day back is midnight; less is a clock that was set back.
@@ -118,18 +118,15 @@ fn to_seconds(raw: &[RawTime], notes: &mut Vec<Note>) -> Vec<f64> {
     times
 }
 
-fn resolve_moments(raw: &[RawTime], mapping: &TimeMapping, notes: &mut Vec<Note>) -> Timed {
-    let is_local = raw.iter().any(|time| matches!(time, RawTime::Local(_)));
+fn resolve_moments(raw: RawTimes, mapping: &TimeMapping, notes: &mut Vec<Note>) -> Timed {
+    let is_local = raw.has(TimeSort::Local);
     let zone = mapping.zone.as_deref().and_then(|name| TimeZone::get(name).ok()).unwrap_or_else(TimeZone::system);
     let mut local = LocalClock { zone, known: HashMap::new(), last_ns: None };
-    let mut utc: Vec<TimeNs> = raw
-        .iter()
-        .map(|time| match time {
-            RawTime::Utc(at_ns) => *at_ns,
-            RawTime::Local(at_ns) => local.resolve_utc(*at_ns),
-            RawTime::Seconds(_) | RawTime::OfDay(_) => 0,
-        })
-        .collect();
+    let mut utc: Vec<TimeNs> = raw.map(|time| match time {
+        RawTime::Utc(at_ns) => at_ns,
+        RawTime::Local(at_ns) => local.resolve_utc(at_ns),
+        RawTime::Seconds(_) | RawTime::OfDay(_) => 0,
+    });
     if is_local {
         let name = local.zone.iana_name().unwrap_or("UTC").to_owned();
         let given = if mapping.zone.is_some() { "" } else { ", that of this computer" };
@@ -142,8 +139,8 @@ fn resolve_moments(raw: &[RawTime], mapping: &TimeMapping, notes: &mut Vec<Note>
         end_of_summer_time(&mut utc, notes);
     }
     let start_ns = utc.first().copied();
-    let since = |at_ns: &TimeNs| in_seconds(at_ns.saturating_sub(start_ns.unwrap_or(0)));
-    Timed { time_s: utc.iter().map(since).collect(), start_ns, ..Timed::default() }
+    let since = |at_ns: TimeNs| in_seconds(at_ns.saturating_sub(start_ns.unwrap_or(0)));
+    Timed { time_s: utc.into_iter().map(since).collect(), start_ns, ..Timed::default() }
 }
 
 struct LocalClock {
@@ -228,6 +225,15 @@ fn join_set_back(times: &mut [f64], notes: &mut Vec<Note>) {
 
 /// Stamps rounded to whole seconds with several rows each: the rows are spread evenly between one stamp and the next.
 fn spread_stamps(times: &mut [f64], notes: &mut Vec<Note>) {
+    #[expect(clippy::float_cmp, reason = "the same stamp")]
+    let stands_again = |row: &usize| {
+        *row > 0 && times[*row] == times[*row - 1] || times.get(*row + 1).is_some_and(|next| *next == times[*row])
+    };
+    let repeated = (0..times.len()).filter(stands_again).count();
+    #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
+    if (repeated as f64) < REPEATED_SHARE * times.len() as f64 {
+        return;
+    }
     let mut groups: Vec<std::ops::Range<usize>> = Vec::new();
     for row in 0..times.len() {
         match groups.last_mut() {
@@ -236,9 +242,7 @@ fn spread_stamps(times: &mut [f64], notes: &mut Vec<Note>) {
             _ => groups.push(row..row + 1),
         }
     }
-    let repeated: usize = groups.iter().filter(|group| group.len() > 1).map(std::ops::Range::len).sum();
-    #[expect(clippy::cast_precision_loss, reason = "numbers of rows are far below 2^53")]
-    if groups.len() < 3 || (repeated as f64) < REPEATED_SHARE * times.len() as f64 {
+    if groups.len() < 3 {
         return;
     }
     let mut sizes: Vec<usize> = groups.iter().map(std::ops::Range::len).collect();
@@ -339,7 +343,7 @@ mod tests {
 
     fn resolved(raw: &[RawTime], mapping: &TimeMapping) -> (Timed, String) {
         let mut notes = Vec::new();
-        let timed = resolve_times(raw, None, mapping, &mut notes);
+        let timed = resolve_times(raw.iter().copied().collect(), None, mapping, &mut notes);
         (timed, notes.iter().map(|note| note.text.en.clone()).collect::<Vec<_>>().join("; "))
     }
 

@@ -1,6 +1,6 @@
 // Files that a person brings: dropped on the view of the twin, shown as understood, mapped by a click, diagnosed,
 // compared with earlier ones. Three examples show what comes of it; their truth is told afterwards.
-import { ask, card, fill, make, say, send, table } from "/web/parts.js";
+import { ask, bring, card, fill, make, say, send, table } from "/web/parts.js";
 import { dateTime, duration, number, quantity } from "/web/format.js";
 import { language, own, t } from "/web/words.js";
 import { drawDiagnoses, summaryOf } from "/web/diagnosis.js";
@@ -13,6 +13,10 @@ export class Brought {
     Object.assign(this, { context, file: null, run: null, known: null });
     this.note = make("p", "note", " ", { role: "status" });
     this.bar = make("progress", "progress", null, { max: "1", hidden: true, "aria-label": t("diagnosing") });
+    this.sent = make("progress", "progress", null, { max: "1", value: "0", "aria-label": t("sending_bar") });
+    this.sentWords = make("span", "note", "");
+    const cancel = make("button", "", t("end_sending"), { type: "button", onclick: () => this.sending?.abort() });
+    this.sendingBox = make("div", "buttons sending", [this.sent, this.sentWords, cancel], { hidden: true });
     this.input = make("input", "", null, {
       type: "file",
       hidden: true,
@@ -40,6 +44,7 @@ export class Brought {
     this.box = card(t("brought_title"), [
       words,
       this.zone,
+      this.sendingBox,
       this.kept,
       this.understood,
       this.bar,
@@ -156,19 +161,50 @@ export class Brought {
     await this.act(async () => {
       if (!this.may()) throw new Error(t("sign_in_to_diagnose"));
       this.begin(file.name);
+      const inMegabytes = (bytes) => Math.floor(bytes / 1048576);
       if (this.known && file.size > this.known.bytes_max)
-        throw new Error(t("file_too_long", Math.round(this.known.bytes_max / 1048576)));
-      say(this.note, t("reading_file", file.name));
-      const headers = { "content-type": "application/octet-stream" };
-      const document = await ask(`/api/v1/files?name=${encodeURIComponent(file.name)}`, {
-        method: "POST",
-        headers,
-        body: await file.arrayBuffer(),
-      });
-      say(this.note, " ");
-      this.show(document);
+        throw new Error(t("file_too_long", inMegabytes(this.known.bytes_max)));
+      if (this.known && file.size > (this.known.bytes_free ?? Infinity))
+        throw new Error(t("no_room_for_file", inMegabytes(this.known.bytes_free)));
+      const begun = this.file;
+      const document = await this.bring(file);
       await this.reload();
+      await this.showWhenRead(document, begun);
     });
+  }
+
+  /** The bytes go to the box; how far they are is told, and they can be held back. */
+  async bring(file) {
+    this.sending?.abort();
+    const sending = new AbortController();
+    this.sending = sending;
+    this.sendingBox.hidden = false;
+    const told = (share) => {
+      this.sent.value = share;
+      say(this.sentWords, t("sending", file.name, Math.floor(100 * share)));
+      if (share >= 1) say(this.note, t("reading_file", file.name));
+    };
+    told(0);
+    say(this.note, " ");
+    try {
+      const words = { broken: t("sending_broken"), ended: t("sending_ended") };
+      const path = `/api/v1/files?name=${encodeURIComponent(file.name)}`;
+      return await bring(path, file, { told, signal: sending.signal, ...words });
+    } finally {
+      if (this.sending === sending) this.sendingBox.hidden = true;
+    }
+  }
+
+  /** A long file is not read at once: it is asked for until it is, unless another one has been opened meanwhile. */
+  async showWhenRead(document, begun) {
+    while (document.reading && this.file === begun) {
+      say(this.note, t("reading_file", document.name));
+      await new Promise((resolve) => setTimeout(resolve, 1000));
+      document = await ask(`/api/v1/files/${document.key}`);
+    }
+    if (this.file !== begun) return;
+    say(this.note, " ");
+    this.show(document);
   }
 
   /** A file that is not understood yet: neither the columns nor the answer of another one stand below its name. */
@@ -179,7 +215,10 @@ export class Brought {
   }
 
   async open(key) {
-    this.show(await ask(`/api/v1/files/${key}`));
+    const { name } = this.known.files.find((file) => file.key === key);
+    this.begin(name);
+    const begun = this.file;
+    await this.showWhenRead(await ask(`/api/v1/files/${key}`), begun);
     this.drawResults();
   }
 
@@ -268,13 +307,9 @@ export class Brought {
         to: to.value.trim(),
         unit: unit.value.trim() === (column.unit ?? "") ? "" : unit.value.trim(),
       }));
-    this.show(
-      await send(
-        `/api/v1/files/${this.file.key}/map`,
-        { columns, time: this.time.value, zone: this.timeZone.value.trim() },
-        "PUT",
-      ),
-    );
+    const begun = this.file;
+    const said = { columns, time: this.time.value, zone: this.timeZone.value.trim() };
+    await this.showWhenRead(await send(`/api/v1/files/${begun.key}/map`, said, "PUT"), begun);
   }
 
   /** What the file is compared with. */
@@ -394,6 +429,7 @@ export class Brought {
   }
 
   leave() {
+    this.sending?.abort();
     clearInterval(this.timer);
   }
 }

@@ -114,6 +114,18 @@ export const TWIN = {
     "The file is longer than {0} MB: diagnose it on the command line.",
     "文件超过 {0} MB：请用命令行诊断。",
   ],
+  no_room_for_file: [
+    "The disk of the box has room for {0} MB more: make room, or bring a shorter file.",
+    "网关磁盘只能再容纳 {0} MB：请腾出空间，或选择较短的文件。",
+  ],
+  sending: ["{0}: {1} % sent", "{0}：已上传 {1} %"],
+  sending_bar: ["How much of the file is sent", "文件上传进度"],
+  end_sending: ["Cancel the upload", "取消上传"],
+  sending_ended: ["The upload is cancelled; nothing of the file is kept.", "上传已取消，未保留文件的任何内容。"],
+  sending_broken: [
+    "The connection broke off; nothing of the file is kept. Try again.",
+    "连接中断，未保留文件的任何内容。请重试。",
+  ],
   understood_as: ["Understood as:", "读取方式："],
   rows_read: ["{0} rows, {1} refused", "{0} 行，拒绝 {1} 行"],
   first_rows: ["First rows as understood", "读取后的前几行"],

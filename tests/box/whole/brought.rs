@@ -8,6 +8,17 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use testkit::process::{Gateway, get, wait_for};
 
+/// Opens the view of the twin for somebody who may bring files.
+pub(super) fn open_twin(browser: &mut Browser, address: &str, token: &str) {
+    browser.open(&format!("http://{address}/twin?lang=en"));
+    browser.wait_until("document.querySelector('.drop-zone')");
+    sign_in(browser, "Li", token);
+    browser.open(&format!("http://{address}/twin?lang=en"));
+    browser.wait_until(
+        "document.querySelector('.drop-zone button') && !document.querySelector('.drop-zone button').disabled",
+    );
+}
+
 /// Drops a file of the tests on the zone, as a hand does.
 fn drop_file(browser: &mut Browser, path: &Path, name: &str) {
     let bytes: Vec<u8> = std::fs::read(path).expect("a file");
@@ -18,14 +29,14 @@ fn drop_file(browser: &mut Browser, path: &Path, name: &str) {
     ));
 }
 
-fn finished(address: &str) -> Value {
+pub(super) fn finished(address: &str) -> Value {
     wait_for("the diagnosis of the file", Duration::from_secs(900), || {
         let run = get(address, "/api/v1/files-diagnosis").json();
         (!["none", "running"].contains(&run["state"].as_str().unwrap_or_default())).then_some(run)
     })
 }
 
-fn press(browser: &mut Browser, text: &str) {
+pub(super) fn press(browser: &mut Browser, text: &str) {
     let find = format!(
         "[...document.querySelectorAll('main button')].find((it) => it.textContent === {} && !it.disabled)",
         json!(text)
@@ -45,13 +56,7 @@ fn a_foreign_file_is_dropped_understood_mapped_and_diagnosed_on_the_page() {
     let address = gateway.address();
     let token = person(&data, "Li", "setter");
     let mut browser = Browser::start(directory.path());
-    browser.open(&format!("http://{address}/twin?lang=en"));
-    browser.wait_until("document.querySelector('.drop-zone')");
-    sign_in(&mut browser, "Li", &token);
-    browser.open(&format!("http://{address}/twin?lang=en"));
-    browser.wait_until(
-        "document.querySelector('.drop-zone button') && !document.querySelector('.drop-zone button').disabled",
-    );
+    open_twin(&mut browser, &address, &token);
     let began = Instant::now();
     let files = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/foreign");
     drop_file(&mut browser, &files.join("excel_de.xlsx"), "Messung Müller.xlsx");

@@ -7,7 +7,7 @@ use rand_pcg::Pcg64Mcg;
 use serde_json::Value;
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -15,52 +15,69 @@ use testkit::process::{Gateway, get, wait_for};
 use testkit::process_status::status_figure;
 
 /// Resident memory that the gateway may come to, MB.
-const GATEWAY_MB: f64 = 120.0;
+pub(super) const GATEWAY_MB: f64 = 120.0;
 /// The same of a child.
-const CHILD_MB: f64 = 512.0;
+pub(super) const CHILD_MB: f64 = 512.0;
 /// 20 s of the processor, which a computer with other work shares.
 const CHILD_WITHIN: Duration = Duration::from_secs(60);
 
 /// A box with somebody who may bring files.
-struct PageBox {
-    gateway: Gateway,
-    address: String,
-    token: String,
+pub(super) struct PageBox {
+    pub(super) gateway: Gateway,
+    pub(super) address: String,
+    pub(super) token: String,
+    pub(super) data: PathBuf,
     _directory: tempfile::TempDir,
 }
 
 impl PageBox {
-    fn start() -> Self {
+    pub(super) fn start() -> Self {
         let directory = tempfile::tempdir().expect("a directory");
         let data = directory.path().join("data");
-        let mut gateway = Gateway::start(&data, &[]);
+        let gateway = Gateway::start(&data, &[]);
+        Self::of_gateway(directory, gateway, data)
+    }
+
+    pub(super) fn of_gateway(directory: tempfile::TempDir, mut gateway: Gateway, data: PathBuf) -> Self {
         let address = gateway.address();
         let token = person(&data, "Li", "setter");
         wait_for("the status", Duration::from_secs(30), || {
             (get(&address, "/api/v1/status").status == 200).then_some(())
         });
-        Self { gateway, address, token, _directory: directory }
+        Self { gateway, address, token, data, _directory: directory }
     }
 
-    /// Brings a file; status and document.
+    /// Brings a file; status and document, when it is read.
     fn bring(&self, name: &str, bytes: &[u8]) -> (u16, Value) {
-        bring(&self.address, &self.token, name, bytes)
+        let (status, told) = bring(&self.address, &self.token, name, bytes);
+        (status, wait_until_read(&self.address, told))
     }
 
-    fn peak_mb(&self) -> f64 {
+    pub(super) fn peak_mb(&self) -> f64 {
         find_peak_mb(&self.gateway.pid().to_string()).expect("it lives")
     }
 }
 
 fn bring(address: &str, token: &str, name: &str, bytes: &[u8]) -> (u16, Value) {
+    let mut stream = begin(address, token, name, &format!("Content-Length: {}", bytes.len()));
+    stream.write_all(bytes).expect("sent");
+    read_answer(stream)
+}
+
+/// The head of a request that brings a file.
+pub(super) fn begin(address: &str, token: &str, name: &str, length: &str) -> TcpStream {
     let mut stream = TcpStream::connect(address).expect("it listens");
     stream.set_read_timeout(Some(Duration::from_secs(90))).expect("a limit");
     let head = format!(
         "POST /api/v1/files?name={name} HTTP/1.1\r\nHost: {address}\r\nAuthorization: Bearer Li:{token}\r\n\
-         Content-Type: application/octet-stream\r\nContent-Length: {}\r\nConnection: close\r\n\r\n",
-        bytes.len()
+         Content-Type: application/octet-stream\r\n{length}\r\nConnection: close\r\n\r\n"
     );
-    stream.write_all(head.as_bytes()).and_then(|()| stream.write_all(bytes)).expect("sent");
+    stream.write_all(head.as_bytes()).expect("sent");
+    stream
+}
+
+/// Status and document.
+pub(super) fn read_answer(mut stream: TcpStream) -> (u16, Value) {
     let mut answer = Vec::new();
     stream.read_to_end(&mut answer).expect("an answer");
     let answer = String::from_utf8_lossy(&answer).into_owned();
@@ -68,6 +85,16 @@ fn bring(address: &str, token: &str, name: &str, bytes: &[u8]) -> (u16, Value) {
     let body = answer.split_once("\r\n\r\n").map_or("", |(_, body)| body);
     let json = body.find('{').and_then(|from| body.rfind('}').map(|to| &body[from..=to]));
     (status, json.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default())
+}
+
+/// Asks until the file is read.
+pub(super) fn wait_until_read(address: &str, mut told: Value) -> Value {
+    while told["reading"] == true {
+        let key = told["key"].as_str().expect("a key").to_owned();
+        std::thread::sleep(Duration::from_secs(1));
+        told = get(address, &format!("/api/v1/files/{key}")).json();
+    }
+    told
 }
 
 /// The foreign files of the tests, as they are.
@@ -129,7 +156,7 @@ fn campaign(files: usize, seed: u64) {
 }
 
 /// The greatest memory of any child until it is over, MB, and how often one was looked at.
-fn watch_children(pid: u32, over: &AtomicBool) -> (f64, usize) {
+pub(super) fn watch_children(pid: u32, over: &AtomicBool) -> (f64, usize) {
     let (mut most_mb, mut seen) = (0.0_f64, 0);
     while !over.load(Ordering::SeqCst) {
         let tasks = std::fs::read_dir(format!("/proc/{pid}/task")).expect("it lives").flatten();

@@ -12,6 +12,7 @@ mod hostile;
 mod http;
 mod kill;
 mod lives;
+mod long_files;
 mod operations;
 mod package;
 mod packaged_root;
