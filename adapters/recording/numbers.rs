@@ -210,7 +210,7 @@ mod tests {
 
     #[test]
     fn what_is_absent_stays_absent_in_whole_blocks_and_after_them() {
-        let cell = |row: usize| (row % 3 != 0).then_some(row as f64 / 4.0);
+        let cell = |row: usize| (!row.is_multiple_of(3)).then_some(row as f64 / 4.0);
         let rows = 2 * BLOCK + 10;
         let mut numbers: Numbers = (0..rows).map(cell).collect();
         assert!((0..rows).all(|row| numbers.get(row) == cell(row)));

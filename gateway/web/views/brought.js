@@ -15,8 +15,8 @@ export class Brought {
     this.bar = make("progress", "progress", null, { max: "1", hidden: true, "aria-label": t("diagnosing") });
     this.sent = make("progress", "progress", null, { max: "1", value: "0", "aria-label": t("sending_bar") });
     this.sentWords = make("span", "note", "");
-    const cancel = make("button", "", t("end_sending"), { type: "button", onclick: () => this.sending?.abort() });
-    this.sendingBox = make("div", "buttons sending", [this.sent, this.sentWords, cancel], { hidden: true });
+    this.cancel = make("button", "", t("end_sending"), { type: "button", onclick: () => this.sending?.abort() });
+    this.sendingBox = make("div", "buttons sending", null, { hidden: true });
     this.input = make("input", "", null, {
       type: "file",
       hidden: true,
@@ -178,7 +178,7 @@ export class Brought {
     this.sending?.abort();
     const sending = new AbortController();
     this.sending = sending;
-    this.sendingBox.hidden = false;
+    this.showSending([this.sent, this.sentWords, this.cancel]);
     const told = (share) => {
       this.sent.value = share;
       say(this.sentWords, t("sending", file.name, Math.floor(100 * share)));
@@ -191,8 +191,14 @@ export class Brought {
       const path = `/api/v1/files?name=${encodeURIComponent(file.name)}`;
       return await bring(path, file, { told, signal: sending.signal, ...words });
     } finally {
-      if (this.sending === sending) this.sendingBox.hidden = true;
+      if (this.sending === sending) this.showSending([]);
     }
+  }
+
+  /** Nothing of it stands on the page while no file is sent. */
+  showSending(parts) {
+    fill(this.sendingBox, parts);
+    this.sendingBox.hidden = !parts.length;
   }
 
   /** A long file is not read at once: it is asked for until it is, unless another one has been opened meanwhile. */
