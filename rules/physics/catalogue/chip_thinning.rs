@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn thin_chips_of_a_mill_need_no_number_of_teeth() {
         let width = |row: usize| [10.0, 20.0, 20.0, 0.0][row % 4];
-        let engaged = |row: usize| f64::from(u8::from(!row.is_multiple_of(4) || row % 8 == 0));
+        let engaged = |row: usize| f64::from(u8::from(!row.is_multiple_of(4) || row.is_multiple_of(8)));
         let (diameter, turn, load) = (|_: usize| 40.0, |_: usize| 0.3, |_: usize| 100.0);
         let inputs: [(&str, &dyn Fn(usize) -> f64); 5] = [
             ("engaged", &engaged),
