@@ -12,18 +12,10 @@ pub fn to_nanoseconds(at_s: f64) -> TimeNs {
     at_ns
 }
 
+/// A moment with its day and its zone: the page shows each such moment by the clock of the reader.
 fn format_time(at_s: f64) -> String {
     let stamp = jiff::Timestamp::from_nanosecond(i128::from(to_nanoseconds(at_s)));
-    stamp.map_or_else(|_| "?".to_owned(), |stamp| stamp.strftime("%Y-%m-%d %H:%M").to_string())
-}
-
-/// Hour and minute, the day only where it differs from that of `beside_s`.
-fn format_time_near(at_s: f64, beside_s: f64) -> String {
-    let (at, other) = (format_time(at_s), format_time(beside_s));
-    match (at.split_once(' '), other.split_once(' ')) {
-        (Some((day, hour)), Some((same, _))) if day == same => hour.to_owned(),
-        _ => at,
-    }
+    stamp.map_or_else(|_| "?".to_owned(), |stamp| stamp.strftime("%Y-%m-%d %H:%M UTC").to_string())
 }
 
 /// A difference for the operator with its beginning, English and Chinese: for the history and the log, whose times are UTC.
@@ -56,8 +48,8 @@ fn describe_onset(onset: Option<&LevelChange>) -> (String, String) {
     };
     // Whole minutes that contain the interval.
     let (low, high) = ((low_s / 60.0).floor() * 60.0, (high_s / 60.0).ceil() * 60.0);
-    let (at, low, high) = (format_time(*at_s), format_time_near(low, *at_s), format_time_near(high, *at_s));
-    (format!("Since {at} UTC (between {low} and {high})"), format!("自{at}（UTC，{low}至{high}之间）起"))
+    let (at, low, high) = (format_time(*at_s), format_time(low), format_time(high));
+    (format!("Since {at} (between {low} and {high})"), format!("自{at}（{low}至{high}之间）起"))
 }
 
 /// The end of a difference, English and Chinese.
@@ -91,9 +83,10 @@ mod tests {
         let found = Mismatch { regime: Regime::Cutting, onset: Some(onset), mean: 61.0, expected: 1000.0 };
         let (en, zh) =
             mismatch_since(&found, ("Power into the spindle drive, negative when it brakes", "主轴驱动功率"), "W");
-        let expected = "Since 2027-01-15 08:00 UTC (between 07:50 and 2027-01-16 08:00), power into the spindle drive while \
-                        cutting is 61 W (6.1 %) more than the simulation says";
+        let expected = "Since 2027-01-15 08:00 UTC (between 2027-01-15 07:50 UTC and 2027-01-16 08:00 UTC), power into the spindle \
+                        drive while cutting is 61 W (6.1 %) more than the simulation says";
         assert_eq!(en, expected);
+        assert!(zh.starts_with("自2027-01-15 08:00 UTC（2027-01-15 07:50 UTC至2027-01-16 08:00 UTC之间）起"), "{zh}");
         assert!(zh.contains("切削时主轴驱动功率比仿真值高61 W"), "{zh}");
     }
 }

@@ -2,6 +2,7 @@
 //! own, see `diagnosis::child`; what is found is stored by the tick, as it is for diagnoses that the box begins by itself.
 
 use super::ServerState;
+use super::gallery;
 use super::guard::with_audit_note;
 use super::headers;
 use super::history::parse_range;
@@ -194,8 +195,16 @@ async fn accept_model(
     JsonBody(Accepted { key }): JsonBody<Accepted>,
 ) -> Result<Response, ApiProblem> {
     let diagnoses = shared.require_diagnoses()?.clone();
+    let files = shared.files.clone();
     let text = read_kept_file(shared, key.clone(), DiagnosisFile::Model).await?;
-    let accepted = move || diagnoses.accept_model(&key, &text).map_err(describe_diagnosis_refusal);
+    let accepted = move || {
+        let results = files.map(|files| files.list_results()).unwrap_or_default();
+        if results.iter().any(|result| result.key == key && gallery::of_file(&result.file).is_some()) {
+            let hint = "bring a recording of this machine, or choose a time of its history";
+            return Err(ApiProblem::conflict(gallery::REFUSED.0, hint));
+        }
+        diagnoses.accept_model(&key, &text).map_err(describe_diagnosis_refusal)
+    };
     respond_with_order(super::rules::run_blocking(accepted).await?)
 }
 

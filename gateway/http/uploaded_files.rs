@@ -97,7 +97,8 @@ fn result_document(files: &FileDiagnoses, live: Option<&DiagnosisHandle>, result
         "verdict": result.verdict, "summary": result.summary, "summary_zh": words.summary_zh, "missing": result.missing,
         "diagnosis": result.diagnosis, "steps": words.steps, "minutes": words.minutes, "effects": words.effects,
         "page": format!("/api/v1/diagnoses/{}/page", result.key), "model": has_model,
-        "refused": describe_live_refusal(live, kept, &result.key), "truth": gallery::of_file(&result.file),
+        "refused": gallery::describe_refusal(&result.file).unwrap_or_else(|| describe_live_refusal(live, kept, &result.key)),
+        "truth": gallery::of_file(&result.file),
     })
 }
 

@@ -9,9 +9,10 @@ use adapters::clock::{SECOND_NS, TimeNs};
 use axum::extract::{Query as Pairs, State};
 use axum::routing::get;
 use gateway_base::moment::time_of_day;
-use gateway_history::{Reader, RecordSpan, StateHour};
+use gateway_history::{Reader, RecordSpan, StateHour, StateInterval};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 const MINUTE_NS: i64 = 60 * SECOND_NS;
 const HOUR_NS: i64 = 60 * MINUTE_NS;
@@ -110,27 +111,57 @@ async fn serve_utilisation(State(shared): State<ServerState>, Pairs(pairs): Hist
     .await
 }
 
-/// The stored hours, and those of the state that lasts.
+/// Seconds of each state within the range: whole hours as they are stored, the hours at its ends and the state that lasts from the intervals.
 fn read_hours(
     reader: &Reader,
     from_ns: TimeNs,
     to_ns: TimeNs,
     newest_ns: TimeNs,
 ) -> Result<Vec<StateHour>, ApiProblem> {
-    let span = RecordSpan::between(from_ns, to_ns, HOURS_MAX);
-    let mut hours = reader.state_hours(span).map_err(|error| describe_history_error(&error))?;
-    let newest =
-        reader.read_states(RecordSpan::between(from_ns, to_ns, 1)).map_err(|error| describe_history_error(&error))?;
-    let open = newest.into_iter().find(|interval| interval.until_ns.is_none());
-    let Some(open) = open else { return Ok(hours) };
-    let (mut at_ns, end_ns) = (open.since_ns.max(from_ns), newest_ns.min(to_ns));
+    let WholeHours { before, whole, behind } = WholeHours::split_range(from_ns..to_ns);
+    let span = RecordSpan::between(whole.start, whole.end, HOURS_MAX);
+    let mut hours =
+        if whole.is_empty() { Vec::new() } else { reader.state_hours(span).map_err(|e| describe_history_error(&e))? };
+    let read = |range: &Range<TimeNs>, most: u32| {
+        reader.read_states(RecordSpan::between(range.start, range.end, most)).map_err(|e| describe_history_error(&e))
+    };
+    for range in [before, behind].into_iter().filter(|range| !range.is_empty()) {
+        read(&range, HOURS_MAX)?.iter().for_each(|state| add_state_seconds(&mut hours, state, &range, newest_ns));
+    }
+    let newest = if whole.is_empty() { Vec::new() } else { read(&whole, 1)? };
+    let open = newest.iter().filter(|state| state.until_ns.is_none());
+    open.for_each(|state| add_state_seconds(&mut hours, state, &whole, newest_ns));
+    Ok(hours)
+}
+
+/// A range as the whole hours in it, and what lies before and behind them; within one hour everything lies before.
+struct WholeHours {
+    before: Range<TimeNs>,
+    whole: Range<TimeNs>,
+    behind: Range<TimeNs>,
+}
+
+impl WholeHours {
+    fn split_range(range: Range<TimeNs>) -> Self {
+        let end_ns = range.end.div_euclid(HOUR_NS) * HOUR_NS;
+        let start_ns = range.start.saturating_add(HOUR_NS - 1).div_euclid(HOUR_NS) * HOUR_NS;
+        if start_ns > end_ns {
+            return Self { whole: start_ns..start_ns, behind: range.end..range.end, before: range };
+        }
+        Self { before: range.start..start_ns, whole: start_ns..end_ns, behind: end_ns..range.end }
+    }
+}
+
+/// What an interval takes of each hour of a range; one that lasts goes to the newest row.
+fn add_state_seconds(hours: &mut Vec<StateHour>, state: &StateInterval, range: &Range<TimeNs>, newest_ns: TimeNs) {
+    let mut at_ns = state.since_ns.max(range.start);
+    let end_ns = state.until_ns.unwrap_or(newest_ns).min(range.end);
     while at_ns < end_ns {
         let start_ns = at_ns.div_euclid(HOUR_NS) * HOUR_NS;
         let until_ns = end_ns.min(start_ns + HOUR_NS);
-        hours.push(StateHour { start_ns, state: open.state.clone(), seconds: to_seconds(until_ns - at_ns) });
+        hours.push(StateHour { start_ns, state: state.state.clone(), seconds: to_seconds(until_ns - at_ns) });
         at_ns = until_ns;
     }
-    Ok(hours)
 }
 
 #[expect(clippy::cast_precision_loss, reason = "less than an hour")]
@@ -168,6 +199,38 @@ mod tests {
         assert_eq!(shift.find_start(wednesday_5_00), 5 * DAY_MINUTES + 22 * 60);
         assert_eq!(shift.find_start(wednesday_5_00 + 60), 6 * DAY_MINUTES + 6 * 60);
         assert_eq!(GroupBy::Week.find_start(-1), -3 * DAY_MINUTES);
+    }
+
+    #[test]
+    fn a_range_is_whole_hours_and_what_lies_around_them() {
+        for (from_s, to_s, whole) in
+            [(0, 7200, 0..7200), (10, 7300, 3600..7200), (10, 3610, 3600..3600), (10, 900, 0..0)]
+        {
+            let split = WholeHours::split_range(from_s * SECOND_NS..to_s * SECOND_NS);
+            let length = |range: &Range<TimeNs>| (range.end - range.start) / SECOND_NS;
+            assert_eq!(length(&split.whole), whole.end - whole.start, "{from_s} to {to_s}");
+            let all = length(&split.before) + length(&split.whole) + length(&split.behind);
+            assert_eq!(all, to_s - from_s, "nothing is counted twice or left out");
+        }
+    }
+
+    #[test]
+    fn an_interval_counts_only_within_the_range() {
+        let state = |until_ns| StateInterval {
+            state: "idle".to_owned(),
+            since_ns: 0,
+            until_ns,
+            program: String::new(),
+            tool: String::new(),
+            ended_by: String::new(),
+        };
+        let mut hours = Vec::new();
+        let range = 3000 * SECOND_NS..4000 * SECOND_NS;
+        add_state_seconds(&mut hours, &state(Some(9000 * SECOND_NS)), &range, 9000 * SECOND_NS);
+        assert_eq!(hours.iter().map(|hour| hour.seconds).collect::<Vec<_>>(), [600.0, 400.0]);
+        hours.clear();
+        add_state_seconds(&mut hours, &state(None), &range, 3500 * SECOND_NS);
+        assert_eq!(hours.iter().map(|hour| hour.seconds).collect::<Vec<_>>(), [500.0]);
     }
 
     #[test]

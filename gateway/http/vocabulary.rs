@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 /// Quantities that are inferred: name, unit, English, Chinese.
 pub const ESTIMATES: [(&str, &str, &str, &str); 15] = [
-    ("filtered_power_w", "W", "Spindle power, filtered", "滤波后的主轴功率"),
+    ("filtered_power_w", "W", "Filtered spindle power", "滤波后的主轴功率"),
     ("no_load_power_w", "W", "No-load power at this speed", "空载功率"),
     ("cutting_power_w", "W", "Cutting power", "切削功率"),
     ("load_loss_w", "W", "Additional loss under load", "附加载荷损耗"),
@@ -28,7 +28,7 @@ pub const ESTIMATES: [(&str, &str, &str, &str); 15] = [
 ];
 
 /// Why an estimate is missing: word, English, Chinese. The full reason stands beside the estimate.
-const NO_ESTIMATES: [(&str, &str, &str); 31] = [
+const NO_ESTIMATES: [(&str, &str, &str); 33] = [
     ("not_yet", "no sample yet", "尚无采样"),
     ("input_missing", "an input is missing", "缺少输入"),
     ("spindle_stopped", "spindle stands still", "主轴静止"),
@@ -42,7 +42,9 @@ const NO_ESTIMATES: [(&str, &str, &str); 31] = [
     ("cut_unknown", "depth or diameter not known", "切削参数未知"),
     ("outside_model", "outside the cuts of the model", "超出模型范围"),
     ("not_observable", "wear cannot be seen in this cut", "此切削中不可观测"),
-    ("no_part_yet", "no part finished yet", "尚未完成一件"),
+    ("no_part_yet", "no part judged yet", "尚无可判断的工件"),
+    ("no_limit", "no cut of this edge has a limit", "此刀刃没有按阈值判断的切削"),
+    ("no_lives_yet", "fewer than two edges of this tool used up", "该刀具用尽的刀刃不足两把"),
     ("feed_unknown", "feed not known", "进给未知"),
     ("no_target", "no load is aimed at", "未设定目标负荷"),
     ("load_unknown", "the load is not measured", "负荷未测量"),

@@ -64,6 +64,10 @@ pub enum NoEstimate {
     NotObservable,
     /// No part, or none of this edge, has been finished yet.
     NoPartYet,
+    /// No cut of this edge has a limit of the wear model.
+    NoLimit,
+    /// Fewer than two edges of this tool have been used up.
+    NoLivesYet,
     /// Nothing is being cut.
     NotCutting,
     /// The power lies below the no-load power by more than the uncertainty: braking, or the no-load power is outdated.
@@ -89,7 +93,7 @@ pub enum NoEstimate {
 
 impl NoEstimate {
     /// Every word of [`NoEstimate::as_word`].
-    pub const WORDS: [&'static str; 25] = [
+    pub const WORDS: [&'static str; 27] = [
         "not_yet",
         "input_missing",
         "machine_off",
@@ -115,6 +119,8 @@ impl NoEstimate {
         "nothing_to_change",
         "power_unknown",
         "control_silent",
+        "no_limit",
+        "no_lives_yet",
     ];
 
     /// The word used in `<quantity>_missing` columns, JSON and SQL.
@@ -146,6 +152,8 @@ impl NoEstimate {
             Self::NothingToChange => "nothing_to_change",
             Self::PowerUnknown => "power_unknown",
             Self::ControlSilent { .. } => "control_silent",
+            Self::NoLimit => "no_limit",
+            Self::NoLivesYet => "no_lives_yet",
         }
     }
 }
@@ -183,6 +191,8 @@ impl fmt::Display for NoEstimate {
             Self::OutsideModel => f.write_str("the cut lies outside those that the model was fitted on"),
             Self::NotObservable => f.write_str("the wear cannot be seen in the power of this cut"),
             Self::NoPartYet => f.write_str("no part has been finished yet"),
+            Self::NoLimit => f.write_str("no cut of this edge has a limit of the wear model"),
+            Self::NoLivesYet => f.write_str("fewer than two edges of this tool have been used up"),
             Self::NotCutting => f.write_str("nothing is being cut"),
             Self::BelowNoLoad => f.write_str("power is below no-load power: braking, or no-load power is outdated"),
             Self::FeedUnknown => f.write_str("neither the feed nor its override is known"),

@@ -1,6 +1,8 @@
 //! Three recordings with one hidden cause each, which anyone can have diagnosed on the page in one click; the truth is told afterwards. They were
 //! written by `tests/records/recordings/make_gallery.py`, by laws of its own.
 
+use serde_json::{Value, json};
+
 /// A recording with one hidden cause, and the model that lacks it.
 #[derive(Debug, Clone, Copy)]
 pub struct Example {
@@ -61,6 +63,15 @@ pub const EXAMPLES: [Example; 3] = [
 pub fn find_example(name: &str) -> Option<&'static Example> {
     EXAMPLES.iter().find(|example| example.name == name)
 }
+
+/// Why the model of a diagnosis of this file cannot take the place of the one in charge, in both languages; `None` where it is no example.
+pub(super) fn describe_refusal(file: &str) -> Option<Value> {
+    of_file(file).map(|_| json!({ "en": REFUSED.0, "zh": REFUSED.1 }))
+}
+
+/// The same in words.
+pub(super) const REFUSED: (&str, &str) =
+    ("this is an example: its machine is not this one", "这是示例：其机床不是本机床");
 
 /// The name of the example that a file is.
 #[must_use]

@@ -328,13 +328,14 @@ impl WearEstimator {
         let follower = &self.memory.follower;
         let (limit_parts, life_share) = follower.read_witnesses(self.edge_in_use());
         let material = follower.material_level().ok_or(NoEstimate::NoPartYet);
+        let no_limit = if self.model.is_some() { NoEstimate::NoLimit } else { NoEstimate::NoModel };
         let without = |reason: NoEstimate| EdgeFigures {
             wear_mm: Err(reason),
             growth_pct: Err(reason),
             worn_probability: Err(reason),
             parts_left: Err(reason),
-            limit_parts: limit_parts.map(f64::from).ok_or(NoEstimate::NoModel),
-            life_share: life_share.ok_or(NoEstimate::NoPartYet),
+            limit_parts: limit_parts.map(f64::from).ok_or(no_limit),
+            life_share: life_share.ok_or(NoEstimate::NoLivesYet),
             material_level_pct: material.map(|(share, sd)| Estimate { value: 100.0 * share, sd: 100.0 * sd }),
         };
         match self.current_outlook() {

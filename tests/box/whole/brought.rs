@@ -93,6 +93,10 @@ fn example(browser: &mut Browser, address: &str) {
     assert_eq!(done["state"], "done", "{done}");
     let files = get(address, "/api/v1/files").json();
     assert_eq!(files["diagnoses"][0]["truth"], "axis", "{files}");
+    let refused = &files["diagnoses"][0]["refused"];
+    assert!(refused["en"].as_str().is_some_and(|why| why.contains("this is an example")), "{refused}");
+    let (status, told) = ask(browser, "POST", "/api/v1/twin/model", &json!({ "key": files["diagnoses"][0]["key"] }));
+    assert!((400..500).contains(&status), "the model of an example was taken over: {told}");
     let truth = get(address, "/api/v1/gallery/axis/truth").json();
     assert!(truth["en"].as_str().is_some_and(|text| text.contains("Dry friction")), "{truth}");
     println!("the axis of the gallery: {}", files["diagnoses"][0]["summary"]);
