@@ -9,15 +9,15 @@ const POWERS: [f64; 10] = [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9];
 /// Numbers with typed absence.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Numbers {
-    blocks: Vec<Block>,
+    blocks: Vec<NumberBlock>,
     /// The cells after the last whole block; an absent one is zero.
     tail: Vec<f64>,
     tail_present: Vec<bool>,
 }
 
-/// A thousand cells.
+/// A thousand cells, packed together.
 #[derive(Debug, Clone, PartialEq)]
-struct Block {
+struct NumberBlock {
     values: Packed,
     /// `None`: every cell has a value.
     present: Option<Box<[bool]>>,
@@ -76,7 +76,7 @@ impl Packed {
     }
 }
 
-impl Block {
+impl NumberBlock {
     fn get(&self, row: usize) -> Option<f64> {
         let is_present = self.present.as_ref().is_none_or(|present| present[row]);
         is_present.then(|| self.values.value_at(row))
@@ -106,7 +106,7 @@ impl Numbers {
         if self.tail.len() == BLOCK {
             let is_full = self.tail_present.iter().all(|present| *present);
             let present = (!is_full).then(|| self.tail_present.as_slice().into());
-            self.blocks.push(Block { values: Packed::from_values(&self.tail), present });
+            self.blocks.push(NumberBlock { values: Packed::from_values(&self.tail), present });
             self.tail.clear();
             self.tail_present.clear();
         }
@@ -135,7 +135,7 @@ impl Numbers {
     /// How many rows have a value.
     #[must_use]
     pub fn count_present(&self) -> usize {
-        self.blocks.iter().map(Block::count_present).sum::<usize>() + count_true(&self.tail_present)
+        self.blocks.iter().map(NumberBlock::count_present).sum::<usize>() + count_true(&self.tail_present)
     }
 
     /// How many rows, absent cells included.

@@ -61,6 +61,7 @@ pub(super) static FILES: &[WebFile] = files! {
     SCRIPT "twin.js" from "views/twin.js",
     SCRIPT "diagnosis.js" from "views/diagnosis.js",
     SCRIPT "brought.js" from "views/brought.js",
+    SCRIPT "brought-sending.js" from "views/brought/sending.js",
     SCRIPT "system.js" from "views/system.js",
     SCRIPT "system-care.js" from "views/system/care.js",
     SCRIPT "system-doctor.js" from "views/system/doctor.js",

@@ -242,7 +242,11 @@ impl<'t> Reader<'t> {
         let parameters = powers
             .iter()
             .enumerate()
-            .map(|(index, power)| build_free_parameter(&format!("power_w[{index}]"), *power, Entry::Linear))
+            .map(|(index, power)| Parameter {
+                // A spindle that turns at a steady speed takes power; less than nothing only where the file says so, of a meter with a zero of its own.
+                range: (power.min(0.0), f64::INFINITY),
+                ..build_free_parameter(&format!("power_w[{index}]"), *power, Entry::Linear)
+            })
             .collect();
         let gear_stage = table.get("gear_stage").and_then(|stage| parse_number(stage.get_ref()));
         Some(build_part(
@@ -571,6 +575,14 @@ mod tests {
         let once = write_model(&parse_model(text).expect("reads"));
         let twice = write_model(&parse_model(&once).expect("reads again"));
         assert_eq!(once, twice);
+    }
+
+    #[test]
+    fn no_refit_makes_a_no_load_power_negative_unless_the_file_says_so() {
+        let text = "schema = \"model/1\"\noutput = \"y_w\"\n[[effect]]\nkind = \"no_load_power\"\nparameters = { speeds_rpm = [0.0, 200.0], power_w = [-3.0, 20.0] }\n";
+        let model = parse_model(text).expect("reads");
+        let ranges: Vec<(f64, f64)> = model.parts[0].parameters.iter().map(|parameter| parameter.range).collect();
+        assert_eq!(ranges, [(-3.0, f64::INFINITY), (0.0, f64::INFINITY)]);
     }
 
     /// What a diagnosis may accept into a model must be a model again, whatever form was found.

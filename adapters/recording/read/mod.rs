@@ -42,6 +42,7 @@ mod one_pass;
 mod plain_number;
 pub(super) mod plan;
 mod preview;
+mod repeated_stamps;
 mod restart;
 mod row_class;
 mod row_times;
@@ -182,12 +183,12 @@ struct PlannedRows {
     /// How the table is written,
     form: Vec<Note>,
     /// and what was met among its rows.
-    met: Vec<Note>,
+    row_notes: Vec<Note>,
 }
 
 impl PlannedRows {
     fn with_notes(self, of_plan: &[Note]) -> ReadRecording {
-        let notes = join_notes([&self.form, of_plan, &self.met]);
+        let notes = join_notes([&self.form, of_plan, &self.row_notes]);
         ReadRecording { recording: self.recording, problems: self.problems, refused: self.refused, notes }
     }
 }
@@ -224,7 +225,7 @@ fn read_planned(
     if recording.count_rows() == 0 {
         return Err(RecordingError::Empty { file: file.to_owned(), problems: done.problems });
     }
-    Ok(PlannedRows { recording, problems: done.problems, refused: done.refused, form, met: done.notes })
+    Ok(PlannedRows { recording, problems: done.problems, refused: done.refused, form, row_notes: done.notes })
 }
 
 #[cfg(test)]

@@ -62,7 +62,7 @@ struct PreviewBasis {
     survey: Survey,
     blocks: Vec<BlockPlan>,
     form: Vec<Note>,
-    met: Vec<Note>,
+    row_notes: Vec<Note>,
 }
 
 impl PreviewBasis {
@@ -85,7 +85,7 @@ impl Preview {
             return Err(Box::new(self));
         };
         if let Ok(read) = &mut self.read {
-            read.notes = join_notes([&basis.form, &plan.notes, &basis.met]);
+            read.notes = join_notes([&basis.form, &plan.notes, &basis.row_notes]);
         }
         Ok(self)
     }
@@ -104,16 +104,16 @@ pub fn preview_recording(path: &Path, mapping: &Mapping) -> Result<Preview, Reco
         Err(error) => return Ok(describe_columns(&head, &[], Err(error))),
     };
     let rows = read_planned(table.as_ref(), &head, &plan, recordings, mapping, &file);
-    let said = rows.as_ref().map(|rows| (rows.form.clone(), rows.met.clone())).ok();
+    let said = rows.as_ref().map(|rows| (rows.form.clone(), rows.row_notes.clone())).ok();
     let preview = describe_columns(&head, &plan.blocks, rows.map(|rows| rows.with_notes(&plan.notes)));
-    let basis = said.map(|(form, met)| PreviewBasis {
+    let basis = said.map(|(form, row_notes)| PreviewBasis {
         file,
         mapping: mapping.clone(),
         head,
         survey,
         blocks: plan.blocks,
         form,
-        met,
+        row_notes,
     });
     Ok(Preview { basis, ..preview })
 }

@@ -1,9 +1,10 @@
 // Files that a person brings: dropped on the view of the twin, shown as understood, mapped by a click, diagnosed,
 // compared with earlier ones. Three examples show what comes of it; their truth is told afterwards.
-import { ask, bring, card, fill, make, say, send, table } from "/web/parts.js";
+import { ask, card, fill, make, say, send, table } from "/web/parts.js";
 import { dateTime, duration, number, quantity } from "/web/format.js";
 import { language, own, t } from "/web/words.js";
 import { drawDiagnoses, summaryOf } from "/web/diagnosis.js";
+import { Sending, checkSize, makeDropZone } from "/web/brought-sending.js";
 
 const STAGES = ["waiting", "reading", "comparing", "writing"];
 const AXES = ["", "x", "y", "z"];
@@ -13,28 +14,14 @@ export class Brought {
     Object.assign(this, { context, file: null, run: null, known: null });
     this.note = make("p", "note", " ", { role: "status" });
     this.bar = make("progress", "progress", null, { max: "1", hidden: true, "aria-label": t("diagnosing") });
-    this.sent = make("progress", "progress", null, { max: "1", value: "0", "aria-label": t("sending_bar") });
-    this.sentWords = make("span", "note", "");
-    this.cancel = make("button", "", t("end_sending"), { type: "button", onclick: () => this.sending?.abort() });
-    this.sendingBox = make("div", "buttons sending", null, { hidden: true });
+    this.sending = new Sending(this.note);
     this.input = make("input", "", null, {
       type: "file",
       hidden: true,
       onchange: () => this.take(this.input.files[0]),
     });
     this.choose = make("button", "", t("choose_file"), { type: "button", onclick: () => this.input.click() });
-    this.zone = make("div", "drop-zone", [make("p", "", t("drop_file")), this.choose, this.input], { tabindex: "0" });
-    for (const name of ["dragenter", "dragover"])
-      this.zone.addEventListener(name, (event) => {
-        event.preventDefault();
-        this.zone.dataset.over = "yes";
-      });
-    this.zone.addEventListener("dragleave", () => delete this.zone.dataset.over);
-    this.zone.addEventListener("drop", (event) => {
-      event.preventDefault();
-      delete this.zone.dataset.over;
-      this.take(event.dataTransfer.files[0]);
-    });
+    this.zone = makeDropZone([make("p", "", t("drop_file")), this.choose, this.input], (file) => this.take(file));
     this.kept = make("div", "buttons");
     this.examples = make("div", "buttons");
     this.understood = make("div", "brought");
@@ -44,7 +31,7 @@ export class Brought {
     this.box = card(t("brought_title"), [
       words,
       this.zone,
-      this.sendingBox,
+      this.sending.box,
       this.kept,
       this.understood,
       this.bar,
@@ -161,44 +148,12 @@ export class Brought {
     await this.act(async () => {
       if (!this.may()) throw new Error(t("sign_in_to_diagnose"));
       this.begin(file.name);
-      const inMegabytes = (bytes) => Math.floor(bytes / 1048576);
-      if (this.known && file.size > this.known.bytes_max)
-        throw new Error(t("file_too_long", inMegabytes(this.known.bytes_max)));
-      if (this.known && file.size > (this.known.bytes_free ?? Infinity))
-        throw new Error(t("no_room_for_file", inMegabytes(this.known.bytes_free)));
+      checkSize(file, this.known);
       const begun = this.file;
-      const document = await this.bring(file);
+      const document = await this.sending.bringFile(file);
       await this.reload();
       await this.showWhenRead(document, begun);
     });
-  }
-
-  /** The bytes go to the box; how far they are is told, and they can be held back. */
-  async bring(file) {
-    this.sending?.abort();
-    const sending = new AbortController();
-    this.sending = sending;
-    this.showSending([this.sent, this.sentWords, this.cancel]);
-    const told = (share) => {
-      this.sent.value = share;
-      say(this.sentWords, t("sending", file.name, Math.floor(100 * share)));
-      if (share >= 1) say(this.note, t("reading_file", file.name));
-    };
-    told(0);
-    say(this.note, " ");
-    try {
-      const words = { broken: t("sending_broken"), ended: t("sending_ended") };
-      const path = `/api/v1/files?name=${encodeURIComponent(file.name)}`;
-      return await bring(path, file, { told, signal: sending.signal, ...words });
-    } finally {
-      if (this.sending === sending) this.showSending([]);
-    }
-  }
-
-  /** Nothing of it stands on the page while no file is sent. */
-  showSending(parts) {
-    fill(this.sendingBox, parts);
-    this.sendingBox.hidden = !parts.length;
   }
 
   /** A long file is not read at once: it is asked for until it is, unless another one has been opened meanwhile. */
@@ -435,7 +390,7 @@ export class Brought {
   }
 
   leave() {
-    this.sending?.abort();
+    this.sending.end();
     clearInterval(this.timer);
   }
 }
