@@ -22,7 +22,7 @@ use thiserror::Error;
 
 /// Words of a path, with that of the machine.
 const WORDS: std::ops::RangeInclusive<usize> = 2..=5;
-/// Letters of a word.
+/// The most letters that a word of the path may have.
 const WORD_MAX: usize = 40;
 
 /// What a word is made of: what topics, subjects, identifiers of XML and names of groups all take.

@@ -26,7 +26,7 @@ pub enum ArrivalError {
         /// Bytes that are left to the history.
         kept_bytes: u64,
     },
-    /// The system refuses.
+    /// The system does not let the file be written.
     #[error("the file cannot be kept: {0}")]
     Io(#[from] std::io::Error),
 }

@@ -179,7 +179,7 @@ fn understand_input(input: Input, mapping: &Mapping) -> Result<UnderstoodTable, 
 struct PlannedRows {
     recording: Recording,
     problems: Vec<RowProblem>,
-    refused: u64,
+    refused_rows: u64,
     /// How the table is written,
     form: Vec<Note>,
     /// and what was met among its rows.
@@ -189,7 +189,7 @@ struct PlannedRows {
 impl PlannedRows {
     fn with_notes(self, of_plan: &[Note]) -> ReadRecording {
         let notes = join_notes([&self.form, of_plan, &self.row_notes]);
-        ReadRecording { recording: self.recording, problems: self.problems, refused: self.refused, notes }
+        ReadRecording { recording: self.recording, problems: self.problems, refused: self.refused_rows, notes }
     }
 }
 
@@ -225,7 +225,7 @@ fn read_planned(
     if recording.count_rows() == 0 {
         return Err(RecordingError::Empty { file: file.to_owned(), problems: done.problems });
     }
-    Ok(PlannedRows { recording, problems: done.problems, refused: done.refused, form, row_notes: done.notes })
+    Ok(PlannedRows { recording, problems: done.problems, refused_rows: done.refused, form, row_notes: done.notes })
 }
 
 #[cfg(test)]
