@@ -15,7 +15,7 @@ const MARKS_MAX: usize = 10_000;
 #[derive(Debug, Default)]
 pub struct FactMarks {
     known: HashSet<String>,
-    /// Oldest first.
+    /// The same marks, the oldest first.
     order: VecDeque<String>,
 }
 
