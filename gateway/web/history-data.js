@@ -16,6 +16,13 @@ const LADDER = [
 ];
 /** A little more than what is looked at, so that a short pan finds data. */
 const MARGIN = 0.2;
+/** Rows of the audit that are writes to the machine, with the outcome of one that was made. What was only noted, refused
+    or held back, or has failed, is none. */
+const WRITTEN = { write: "written", stop: "sent", feed_hold: "sent" };
+export const reachedMachine = (row) => row.outcome !== undefined && WRITTEN[row.kind] === row.outcome;
+/** The gate was opened or closed: no write, but it stands in the list beside them. */
+const gateMoved = (row) =>
+  (row.kind === "armed" && row.outcome === "armed") || (row.kind === "disarmed" && row.outcome !== "was_not_armed");
 
 export const resolutionFor = (seconds) => LADDER.find(([most]) => seconds <= most)[1];
 const utc = (s) => new Date(Math.round(s * 1000)).toISOString();
@@ -78,7 +85,7 @@ export class HistoryData {
         parts: parts.rows,
         partsCut: parts.truncated,
         alarms: alarms.rows,
-        writes: audit.rows.filter((r) => ["write", "armed", "disarmed", "stop", "feed_hold"].includes(r.kind)),
+        writes: audit.rows.filter((row) => reachedMachine(row) || gateMoved(row)),
       };
     } catch (error) {
       if (error.name === "AbortError" || turn !== this.turn) return null;

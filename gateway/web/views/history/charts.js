@@ -4,6 +4,7 @@ import { fill, make } from "/web/parts.js";
 import { dateTime, quantity, unitName } from "/web/format.js";
 import { language, t } from "/web/words.js";
 import { LINES, TimePlot } from "/web/plot.js";
+import { reachedMachine } from "/web/history-data.js";
 
 /** One chart for each unit, all over the same time. */
 export function drawPlots(view) {
@@ -74,7 +75,7 @@ export function drawRibbon(view) {
   const found = view.found ?? { states: [], shares: [], alarms: [], writes: [], parts: [] };
   const marks = [
     ...found.alarms.map((a) => ({ at: a.raised_ms / 1000, tone: a.severity === "critical" ? "bad" : "warn" })),
-    ...found.writes.map((w) => ({ at: w.at_ns / 1e9, tone: "accent" })),
+    ...found.writes.filter(reachedMachine).map((w) => ({ at: w.at_ns / 1e9, tone: "accent" })),
   ];
   const near = view.to - view.from < 12 * 3600 && found.parts.length < 200;
   view.ribbon.show(view.from, view.to, found.states, {
