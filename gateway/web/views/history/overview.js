@@ -1,5 +1,5 @@
 // The whole history as a band below the charts of the view "History".
-import { ask, colour, fill, make } from "/web/parts.js";
+import { ask, colour, fill, make, say } from "/web/parts.js";
 import { dateTime } from "/web/format.js";
 import { t } from "/web/words.js";
 import { AXIS_PX, RIGHT_PX } from "/web/plot.js";
@@ -10,10 +10,9 @@ import { STATE_ORDER } from "/web/ribbon.js";
 export function drawOverview(view) {
   view.canvas = make("canvas", "");
   view.window = make("div", "window");
+  view.wholeWords = make("div", "note whole-words");
   view.overview.append(view.canvas, view.window);
-  fill(view.overviewBox, [
-    make("div", "note whole-words", t("whole_words", dateTime(view.first * 1000), dateTime(view.edge() * 1000))),
-  ]);
+  fill(view.overviewBox, [view.wholeWords]);
   new ResizeObserver(() => paintOverview(view)).observe(view.overview);
   const place = (event) => {
     const b = view.overview.getBoundingClientRect();
@@ -91,6 +90,7 @@ function paintOverview(view) {
 
 export function drawWindow(view) {
   if (!view.window) return;
+  say(view.wholeWords, t("whole_words", dateTime(view.first * 1000), dateTime(view.edge() * 1000)));
   const room = view.overview.clientWidth - AXIS_PX - RIGHT_PX;
   const share = (s) => Math.min(1, Math.max(0, (s - view.first) / (view.edge() - view.first || 1)));
   view.window.style.left = `${AXIS_PX + share(view.from) * room}px`;
