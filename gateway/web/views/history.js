@@ -32,7 +32,7 @@ export function mount(root, context) {
 
 /** Seconds since 1970 as a field of date and time takes them, in the time of this computer. */
 function localMoment(s) {
-  const ms = Math.round(s) * 1000;
+  const ms = Math.floor(s) * 1000;
   return new Date(ms - new Date(ms).getTimezoneOffset() * 60000).toISOString().slice(0, 19);
 }
 
