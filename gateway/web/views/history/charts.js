@@ -1,7 +1,7 @@
 // The charts of the view "History": one for each unit, the values under the cursor, the ribbon of states, the choice of
 // channels.
 import { fill, make } from "/web/parts.js";
-import { dateTime, quantity, unitName } from "/web/format.js";
+import { dateTime, number, quantity, unitName } from "/web/format.js";
 import { language, t } from "/web/words.js";
 import { LINES, TimePlot } from "/web/plot.js";
 import { reachedMachine } from "/web/history-data.js";
@@ -58,7 +58,7 @@ export function readOut(view, plot, index) {
     const unit = view.known.find((s) => s.name === name)?.unit ?? "";
     const mark = make("i");
     mark.style.background = `var(--${view.colours[name]})`;
-    const spread = low == null || high == null || low === high ? "" : ` (${quantity(low, "")} … ${quantity(high, "")})`;
+    const spread = low == null || high == null || low === high ? "" : ` (${number(low, unit)} … ${number(high, unit)})`;
     return make("span", "", [
       mark,
       `${labelOf(view, name)} `,
