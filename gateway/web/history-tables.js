@@ -213,12 +213,14 @@ export function marksTable(root, found, range, go) {
       tone: a.severity === "critical" ? "bad" : "warn",
       count: a.count,
     }));
-  const writes = found.writes.map((w) => ({
-    at: w.at_ns / 1e6,
-    what: `${t(`kind_${w.kind}`)}${w.after === null ? "" : ` → ${quantity(w.after, w.unit)}`} · ${box(w.reason)}`,
-    kind: t("override"),
-    tone: "",
-  }));
+  const writes = found.writes
+    .filter((w) => w.at_ns / 1e6 >= from)
+    .map((w) => ({
+      at: w.at_ns / 1e6,
+      what: `${t(`kind_${w.kind}`)}${w.after === null ? "" : ` → ${quantity(w.after, w.unit)}`} · ${box(w.reason)}`,
+      kind: t("override"),
+      tone: "",
+    }));
   const all = [...alarms, ...writes].filter((m) => m.at <= to).sort((a, b) => b.at - a.at);
   if (!all.length) return fill(root, [make("p", "empty", t("no_marks"))]);
   const rows = all.slice(0, ROWS_MAX).map((m) => [
@@ -228,7 +230,7 @@ export function marksTable(root, found, range, go) {
         onclick: () => go(m.at / 1000 - 60, m.at / 1000 + 60),
       }),
     },
-    { text: make("span", m.tone ? `${m.tone}-text` : "", m.kind) },
+    { text: make("span", `one-line ${m.tone ? `${m.tone}-text` : ""}`.trim(), m.kind) },
     m.what + (m.count > 1 ? ` (${m.count} ×)` : ""),
     m.until === undefined ? "" : m.until === null ? t("still_there") : t("until_clock", clock(m.until)),
   ]);
