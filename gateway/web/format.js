@@ -61,14 +61,15 @@ export function energy(joules) {
 /** A name that a controller gave as a number: "105.0" is "105". */
 export const plainName = (text) => (/^\d+\.0+$/.test(text) ? String(Number(text)) : text);
 
-/** 12 s, 3 min 20 s, 2 h 05 min, 3 d 4 h. */
+/** 12 s, 3 min 20 s, 2 h 05 min, 3 d 4 h, each rounded to its last unit: cut off, a sum is more than its parts. */
 export function duration(seconds) {
-  const s = Math.max(0, Math.floor(seconds));
+  const all = Math.max(0, seconds);
+  const [s, min, h] = [1, 60, 3600].map((unit) => Math.round(all / unit));
   const two = (n) => String(n).padStart(2, "0");
   if (s < 60) return `${s} ${t("s")}`;
   if (s < 3600) return `${Math.floor(s / 60)} ${t("min")} ${two(s % 60)} ${t("s")}`;
-  if (s < 172800) return `${Math.floor(s / 3600)} ${t("h")} ${two(Math.floor(s / 60) % 60)} ${t("min")}`;
-  return `${Math.floor(s / 86400)} ${t("d")} ${Math.floor(s / 3600) % 24} ${t("h")}`;
+  if (min < 2880) return `${Math.floor(min / 60)} ${t("h")} ${two(min % 60)} ${t("min")}`;
+  return `${Math.floor(h / 24)} ${t("d")} ${h % 24} ${t("h")}`;
 }
 
 export function bytes(count) {
@@ -96,8 +97,9 @@ export const when = (ms, nowMs) => (day(ms) === day(nowMs) ? clock(ms) : dateTim
 /** The data directory of `DIR/identified/tool-wear.json`. */
 export const folder = (file) => file?.replace(/\/identified\/[^/]*$/, "") ?? "";
 
-/** `simulated://lathe?device=meter` is a meter to whoever looks at the page. */
-export const sourceName = (name) =>
-  name.startsWith("simulated:")
-    ? `${t("simulated")} · ${/device=(\w+)/.exec(name)?.[1] === "meter" ? t("meter") : t("controller")}`
-    : name;
+/** `simulated://lathe?device=meter` is a meter to whoever looks at the page; without a device it is the whole machine. */
+export function sourceName(name) {
+  if (!name.startsWith("simulated:")) return name;
+  const device = /device=(\w+)/.exec(name)?.[1];
+  return device ? `${t("simulated")} · ${t(device === "meter" ? "meter" : "controller")}` : t("simulated");
+}
