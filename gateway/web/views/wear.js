@@ -9,8 +9,13 @@ const PARTS = 400;
 const READ_EVERY_MS = 15000;
 /** Parts above the limit that make an alarm, as the script has it unless somebody has set it otherwise. */
 const LIMIT_PARTS = 3;
+/** A point of the figure at which nothing is drawn. */
+const NO_VALUES = { cutting_power_w: null, limit_w: null, wear_mm: null };
 /** The box counts no further. */
 const PARTS_MOST = 9999;
+/** The tool of an edge: `T1` of `T1-2`, as the box has it; a longer number is part of the name. */
+const toolOf = (edge) => edge.replace(/(?<=.)-\d{1,4}$/, "");
+const edgeOf = (use) => use.edge || use.tool;
 const parts = (count) => (count >= PARTS_MOST ? t("many") : number(Math.round(count)));
 
 export function mount(root, context) {
@@ -44,7 +49,7 @@ export function mount(root, context) {
       ]);
       [state.parts, state.models] = [parts.rows.filter((p) => p.tools), library.models];
       const known = [...new Set(state.parts.flatMap((p) => p.tools.map((u) => u.tool)))].filter(Boolean).sort();
-      if (!known.includes(state.tool)) state.tool = context.quantity("tool")?.value ?? null;
+      if (!known.includes(state.tool)) state.tool = toolOf(context.quantity("tool")?.value ?? "");
       if (!known.includes(state.tool)) state.tool = known[0] ?? null;
       fill(
         tools,
@@ -196,11 +201,47 @@ function drawEdge(lamp, facts, status, context) {
   fill(facts, rows);
 }
 
+/** Every use of a tool, part by part. Where another edge of it begins there is a point without values, so that the lines
+    of two edges are not one. */
+function usesOf(parts, tool) {
+  const uses = [];
+  parts.forEach((part, i) => {
+    for (const use of part.tools.filter((u) => u.tool === tool)) {
+      const last = uses.at(-1);
+      const at = i + 1;
+      if (last && edgeOf(last.tool) !== edgeOf(use))
+        uses.push({ at: (last.at + at) / 2, begins: edgeOf(use), tool: NO_VALUES });
+      uses.push({ at, part, tool: use });
+    }
+  });
+  return uses;
+}
+
+/** A dashed line where another edge begins, with its name. */
+function markEdges(u, uses) {
+  const pen = u.ctx;
+  const ratio = devicePixelRatio || 1;
+  pen.save();
+  pen.strokeStyle = pen.fillStyle = colour("soft");
+  pen.lineWidth = ratio;
+  pen.setLineDash([3 * ratio, 3 * ratio]);
+  pen.font = `${12 * ratio}px system-ui, sans-serif`;
+  pen.textBaseline = "top";
+  pen.textAlign = "left";
+  for (const { at, begins } of uses.filter((it) => it.begins)) {
+    const x = Math.round(u.valToPos(at, "x", true));
+    pen.beginPath();
+    pen.moveTo(x, u.bbox.top);
+    pen.lineTo(x, u.bbox.top + u.bbox.height);
+    pen.stroke();
+    pen.fillText(begins, x + 4 * ratio, u.bbox.top + 2 * ratio);
+  }
+  pen.restore();
+}
+
 function drawFigure(figure, below, state) {
   figure.replaceChildren();
-  const use = state.parts
-    .map((p, i) => ({ at: i + 1, part: p, tool: p.tools.find((u) => u.tool === state.tool) }))
-    .filter((u) => u.tool);
+  const use = usesOf(state.parts, state.tool);
   if (!use.length) {
     fill(figure, [make("p", "empty", t("no_wear_parts"))]);
     say(below, "");
@@ -255,9 +296,10 @@ function drawFigure(figure, below, state) {
         setCursor: [
           (u) => {
             const i = u.cursor.idx;
-            if (i !== null && i !== undefined) say(below, told(use[i]));
+            if (use[i]?.part) say(below, told(use[i]));
           },
         ],
+        draw: [(u) => markEdges(u, use)],
       },
     },
     [use.map((u) => u.at), pick("limit_w"), use.map((u) => powerBesideLimit(u.tool)), pick("wear_mm")],
@@ -279,7 +321,7 @@ function told({ part, tool }) {
   const wear =
     tool.wear_mm === null ? "–" : `${number(tool.wear_mm, "mm")} ± ${quantity(tool.wear_uncertainty_mm ?? 0, "mm")}`;
   const share = watts !== null && tool.limit_w > 0 ? ` (${number((100 * watts) / tool.limit_w)} %)` : "";
-  return t("wear_told", dateTime(part.to_ms), `${power}${share}`, limit, wear);
+  return `${edgeOf(tool)}: ${t("wear_told", dateTime(part.to_ms), `${power}${share}`, limit, wear)}`;
 }
 
 /** A share of the variance in percent. What rounds to 100 is not all of it. */
