@@ -9,6 +9,8 @@ const PARTS = 400;
 const READ_EVERY_MS = 15000;
 /** Parts above the limit that make an alarm, as the script has it unless somebody has set it otherwise. */
 const LIMIT_PARTS = 3;
+/** From here on the filter says that the edge is worn. */
+const WORN_PROBABILITY = 0.5;
 /** A point of the figure at which nothing is drawn. */
 const NO_VALUES = { cutting_power_w: null, limit_w: null, wear_mm: null };
 /** The box counts no further. */
@@ -90,6 +92,13 @@ function legend() {
   );
 }
 
+/** Is the edge known to be good? By its wear, or, in a cut that shows none, by the filter over the parts before. */
+function knownGood(wear, context) {
+  const probability = context.quantity("tool_worn_probability");
+  const judged = probability && !probability.missing && probability.value < WORN_PROBABILITY;
+  return wear?.flank_wear_mm != null || Boolean(judged);
+}
+
 function drawEdge(lamp, facts, status, context) {
   const wear = status.wear;
   const tool = context.quantity("tool");
@@ -99,17 +108,12 @@ function drawEdge(lamp, facts, status, context) {
   const named = (text) => text.split(/[^\w-]+/).includes(name);
   const [worn, look] = [standing("tool_worn_"), standing("tool_wear")];
   const own_ = worn.some((a) => named(a.text));
+  const good = knownGood(wear, context);
   // A lamp that is grey beside a standing alarm is read as a fault: it is red for whichever edge is meant, and says
   // which.
-  lamp.dataset.tone = worn.length ? "bad" : look.length ? "warn" : wear?.flank_wear_mm != null ? "good" : "";
+  lamp.dataset.tone = worn.length ? "bad" : look.length ? "warn" : good ? "good" : "";
   const word = t(
-    own_
-      ? "lamp_worn"
-      : look.some((a) => named(a.text))
-        ? "lamp_look"
-        : wear?.flank_wear_mm != null
-          ? "lamp_good"
-          : "lamp_unknown",
+    own_ ? "lamp_worn" : look.some((a) => named(a.text)) ? "lamp_look" : good ? "lamp_good" : "lamp_unknown",
   );
   say(
     lamp,
@@ -181,7 +185,7 @@ function drawEdge(lamp, facts, status, context) {
       t("witness_filter"),
       probability ? pct(probability.value) : "–",
       probability ? null : why("tool_worn_probability"),
-      { dot: !probability ? "" : probability.value >= 0.5 ? "bad" : "good" },
+      { dot: !probability ? "" : probability.value >= WORN_PROBABILITY ? "bad" : "good" },
     ),
     row(
       t("witness_limit"),

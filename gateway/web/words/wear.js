@@ -23,7 +23,7 @@ export const WEAR = {
   witness_limit_words: ["of {0} that make an alarm; it overrides the filter", "达到 {0} 件即报警；优先于滤波"],
   witness_time: ["Cut by this edge over what the edges before it had cut", "切削量与以往刀刃之比"],
   witness_time_words: ["speaks where no wear model was learned", "未学习磨损模型时起作用"],
-  material_level: ["Material takes more than usual", "材料比平常多耗"],
+  material_level: ["Power taken by the material, against usual", "材料耗功与平常之差"],
   material_words: ["what all tools have in common; a harder lot is no wear", "各刀具共同部分；硬料不是磨损"],
   other_edges: ["Alarm stands for another edge", "其它刀刃有报警"],
   criterion: ["worn at {0}", "磨钝标准 {0}"],
