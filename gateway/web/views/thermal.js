@@ -3,7 +3,7 @@
 import { ask, card, fill, make, row, say, table } from "/web/parts.js";
 import { folder, number, quantity } from "/web/format.js";
 import { t } from "/web/words.js";
-import { TimePlot, drawnFrom } from "/web/plot.js";
+import { LINES, TimePlot, drawnFrom } from "/web/plot.js";
 import { columns, resolutionFor } from "/web/history-data.js";
 
 const TEMPERATURE = /(_temperature_c|^temperature_\d+_c)$/;
@@ -12,6 +12,13 @@ const SPAN_S = 8 * 3600;
 const FIGURE_S = 10;
 const [READ_MS, READ_EARLY_MS] = [20000, 1500];
 
+/** A line of a figure in its legend. */
+function keyOf({ label, line }) {
+  const mark = make("i");
+  mark.style.background = `var(--${line})`;
+  return make("span", "", [mark, label]);
+}
+
 export function mount(root, context) {
   const now = make("div", "");
   const offsets = make("div", "");
@@ -19,13 +26,14 @@ export function mount(root, context) {
   const warmth = make("div", "plot-box");
   const note = make("p", "note", " ");
   const collecting = make("p", "note", "", { hidden: true });
-  const list = make("div", "legend");
+  const [errorKey, list] = [make("div", "legend"), make("div", "legend")];
   const points = make("div", "");
   root.append(
     make("div", "columns", [card(t("thermal_now"), now, "ages"), card(t("thermal_offsets"), offsets, "ages")]),
     card("", [
       make("div", "head", [make("h2", "", t("thermal_error_figure")), make("span", "note", t("last_eight_hours"))]),
       collecting,
+      errorKey,
       error,
       note,
     ]),
@@ -98,10 +106,15 @@ export function mount(root, context) {
       plot.give(data);
       plot.show(drawnFrom(data, ...range), range[1]);
       plots.push(plot);
-      say(note, drawn.map((d) => d.label).join(" · "));
-    } else say(note, t("no_thermal"));
+      fill(errorKey, drawn.map(keyOf));
+      say(note, "");
+    } else {
+      fill(errorKey, []);
+      say(note, t("no_thermal"));
+    }
+    const warmths = wanted.map((name, at) => ({ label: context.name(name), unit: "°C", line: LINES[at] }));
     const plot = new TimePlot(warmth, {
-      series: wanted.map((name) => ({ label: context.name(name), unit: "°C" })),
+      series: warmths,
       height: 240,
       label: t("temperatures"),
       sync: "thermal",
@@ -110,17 +123,8 @@ export function mount(root, context) {
     plot.give(warm);
     plot.show(drawnFrom(warm, ...range), range[1]);
     plots.push(plot);
-    fill(
-      list,
-      wanted.map((name, at) => {
-        const mark = make("i");
-        mark.style.background = `var(--line-${"abcdef"[at]})`;
-        return make("span", "", [
-          mark,
-          `${context.name(name)} ${last(name) === null ? "–" : quantity(last(name), "°C")}`,
-        ]);
-      }),
-    );
+    // Without values: the newest of the history are older than those above.
+    fill(list, warmths.map(keyOf));
   };
   let timer = null;
   const again = async () => {
