@@ -211,6 +211,14 @@ function gateCard(context) {
     hidden: true,
     onclick: () => disarm(back, context),
   });
+  // Whether the configuration lets the box be armed at all; null until it is known.
+  let armable = null;
+  ask("/api/v1/configuration")
+    .then((found) => {
+      armable = found.armed;
+      update(context.status());
+    })
+    .catch(() => {});
   const box_ = make("section", "card ages", [
     make("div", "head", [make("h2", "", t("gate_title")), make("div", "buttons grow", [arm, back])]),
     words,
@@ -226,9 +234,11 @@ function gateCard(context) {
         : t(gate.mode === "off" ? "gate_off" : "gate_shadow"),
     );
     words.classList.toggle("warn-text", gate.mode === "armed");
-    if (gate.mode !== "armed") say(note, context.session?.arming_allowed ? t("arm_here") : t("arm_at_box"));
+    const here = context.session?.arming_allowed;
+    const how = armable ? t(here ? "arm_here" : "arm_at_box") : armable === false ? t("arm_not_configured") : " ";
+    if (gate.mode !== "armed") say(note, how);
     back.hidden = gate.mode !== "armed";
-    arm.hidden = gate.mode === "armed" || !(context.session?.arming_allowed && context.session?.may?.arm);
+    arm.hidden = gate.mode === "armed" || armable === false || !(here && context.session?.may?.arm);
   };
   return { box: box_, update };
 }
