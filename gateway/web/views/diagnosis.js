@@ -1,7 +1,7 @@
 // Diagnoses in the view of the twin: one asked for over a chosen time, with how far it is; the latest in words; earlier
 // ones; its report, its model to take over, and the experiment it asks for as a list to tick off.
 import { ask, card, fill, make, row, say, send, table } from "/web/parts.js";
-import { dateTime, duration, number, quantity } from "/web/format.js";
+import { dateTime, duration, number, quantity, unitName } from "/web/format.js";
 import { language, own, t } from "/web/words.js";
 
 const SPANS_H = [1, 2, 4, 8];
@@ -14,7 +14,7 @@ const LONGEST_H = 8;
 export const summaryOf = (found) => own({ en: found.summary, zh: found.summary_zh ?? found.summary });
 /** A model that fits only with other parameters does not agree: the word says so. */
 const moved = (found) => found.verdict === "no_mismatch" && found.beside?.some((one) => one.of_parameters);
-const verdictOf = (found) => t(moved(found) ? "verdict_parameter" : `verdict_${found.verdict}`);
+export const verdictOf = (found) => t(moved(found) ? "verdict_parameter" : `verdict_${found.verdict}`);
 const report = (found) => `${found.page}?lang=${language()}`;
 const local = (ms) => new Date(ms - new Date(ms).getTimezoneOffset() * 60000).toISOString().slice(0, 16);
 
@@ -182,15 +182,18 @@ function fitWords({ fit, unit }) {
   return fit.ceiling ? `${words} ${t("ceiling_words", quantity(of(fit.ceiling), unit))}` : words;
 }
 
+/** The time that was examined; a file has none that is told. */
+const examinedTime = ({ from_ms, to_ms }) =>
+  from_ms === to_ms ? "" : `${t("examined")} ${dateTime(from_ms)} – ${dateTime(to_ms)}`;
+
+/** A sentence of the box without the unit of what has none: "p0 1 → 1.3 1" is "p0 1 → 1.3". */
+const withoutOne = (text) => text.replace(/(?<![\w.])(\d[\d.e-]*) 1(?!\d|[.,]\d)/g, "$1");
+
 function told(found, context, done) {
   const d = found.diagnosis ?? {};
   const parts = [
     make("p", "summary", summaryOf(found)),
-    make(
-      "p",
-      "note",
-      `${verdictOf(found)} · ${t("examined")} ${dateTime(found.from_ms)} – ${dateTime(found.to_ms)} · ${dateTime(found.at_ms)}`,
-    ),
+    make("p", "note", [verdictOf(found), examinedTime(found), dateTime(found.at_ms)].filter(Boolean).join(" · ")),
   ];
   for (const doubt of d.unit_doubts ?? []) parts.push(make("p", "warn-text", own(doubt)));
   if (d.simulated)
@@ -217,7 +220,7 @@ function told(found, context, done) {
         row(
           t(`regime_${one.regime}`),
           amount(one.difference),
-          `${own({ en: one.text, zh: one.zh })} · ${t("beside_of", amount(one.by_parameters), amount(effects(one)), amount(one.left))}`,
+          `${withoutOne(own({ en: one.text, zh: one.zh }))} · ${t("beside_of", amount(one.by_parameters), amount(effects(one)), amount(one.left))}`,
           { dot: one.differs ? "bad" : "good" },
         ),
       ),
@@ -226,7 +229,7 @@ function told(found, context, done) {
   for (const it of d.missing ?? []) {
     const numbers = (it.parameters ?? []).map(
       (p) =>
-        `${p.name} = ${number(p.value)}${p.low == null ? "" : ` (${number(p.low)} … ${number(p.high)})`} ${p.unit ?? ""}`,
+        `${p.name} = ${number(p.value)}${p.low == null ? "" : ` (${number(p.low)} … ${number(p.high)})`} ${unitName(p.unit)}`,
     );
     const name = effectText(found, it.effect, "name");
     parts.push(
@@ -291,8 +294,10 @@ function buttons(found, context) {
   if (found.page) all.push(link(report(found), t("open_report"), { target: "_blank", rel: "noopener" }));
   if (found.steps?.length) all.push(link(`/api/v1/diagnoses/${found.key}/plan?lang=${language()}`, t("plan_csv")));
   if (found.model) all.push(link(`/api/v1/diagnoses/${found.key}/model`, t("download_model")));
-  // What the machine cannot feed is refused here, with the reason, and not after a click.
-  if (found.model && context.status()?.twin && !found.refused) {
+  // An example is of another machine: its model is only there to be looked at. What the machine cannot feed is refused
+  // here, with the reason, and not after a click.
+  const offered = found.model && !found.truth;
+  if (offered && context.status()?.twin && !found.refused) {
     const accept = make("button", "", t("accept_model"), {
       type: "button",
       onclick: () => confirmed(accept, found, note),
@@ -300,7 +305,7 @@ function buttons(found, context) {
     accept.disabled = !context.session?.may?.edit;
     all.push(accept);
   }
-  const refused = found.model && found.refused ? [make("p", "warn-text", own(found.refused))] : [];
+  const refused = offered && found.refused ? [make("p", "warn-text", own(found.refused))] : [];
   return make("div", "", [...refused, make("div", "buttons", [...all, note])]);
 }
 
