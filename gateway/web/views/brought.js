@@ -3,7 +3,7 @@
 import { ask, card, fill, make, say, send, table } from "/web/parts.js";
 import { dateTime, duration, number, quantity } from "/web/format.js";
 import { language, own, t } from "/web/words.js";
-import { drawDiagnoses, summaryOf } from "/web/diagnosis.js";
+import { drawDiagnoses, summaryOf, verdictOf } from "/web/diagnosis.js";
 import { Sending, checkSize, makeDropZone } from "/web/brought-sending.js";
 
 const STAGES = ["waiting", "reading", "comparing", "writing"];
@@ -110,7 +110,7 @@ export class Brought {
     const rows = all.map((d) => [
       d.file,
       dateTime(d.at_ms),
-      t(`verdict_${d.verdict}`),
+      verdictOf(d),
       summaryOf(d),
       fit(d, "before"),
       fit(d, "after"),

@@ -187,7 +187,7 @@ const examinedTime = ({ from_ms, to_ms }) =>
   from_ms === to_ms ? "" : `${t("examined")} ${dateTime(from_ms)} – ${dateTime(to_ms)}`;
 
 /** A sentence of the box without the unit of what has none: "p0 1 → 1.3 1" is "p0 1 → 1.3". */
-const withoutOne = (text) => text.replace(/(?<![\w.])(\d[\d.e-]*) 1(?!\d|[.,]\d)/g, "$1");
+const withoutOne = (text) => text.replace(/(?<![\w.])(\d[\d.e-]*) 1(?!\w|[.,]\d)/g, "$1");
 
 function told(found, context, done) {
   const d = found.diagnosis ?? {};

@@ -12,7 +12,7 @@ export const TWIN = {
   no_twin: ["No simulation runs beside this machine", "未配置仿真"],
   no_twin_words: [
     "With a model of this machine the box compares every second what is measured with what physics says, tells when they begin to differ, and names what the model leaves out. Name a model file under [twin] model in the configuration; chapter “Contracts” of the help says how one is written.",
-    "配置本机模型后，网关每秒对照实测与物理仿真，出现偏差即告知，并指出模型缺少的效应。请在配置 [twin] model 中指定模型文件，编写方法见手册“Contracts”一章（英文）。",
+    "配置本机模型后，网关每秒对照实测与物理仿真，出现偏差即告知，并指出模型缺少的效应。请在配置 [twin] model 中指定模型文件，编写方法见手册《文件约定：记录、模型、诊断》一章。",
   ],
   twin_differs: ["The machine differs from its simulation", "机床与仿真出现偏差"],
   twin_learning: ["Learning what is usual", "正在学习正常范围"],
