@@ -40,7 +40,7 @@ export const FRAME = {
   // units
   s: ["s", "秒"],
   min: ["min", "分"],
-  h: ["h", "时"],
+  h: ["h", "小时"],
   d: ["d", "天"],
   rpm: ["rpm", "r/min"],
   // help
