@@ -7,7 +7,8 @@ import { clock, clockMinute, dayShort, number, unitName } from "./format.js";
 
 /** Width of the value axis: the same everywhere, so that charts and ribbons stand exactly above each other. */
 export const AXIS_PX = 64;
-export const RIGHT_PX = 12;
+/** Room for half of the last label of the time. */
+export const RIGHT_PX = 28;
 /** Room for the unit, so that it never lies on the greatest number of the axis. */
 const TOP_PX = 20;
 export const LINES = ["line-a", "line-b", "line-c", "line-d", "line-e", "line-f"];
