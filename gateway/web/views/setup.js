@@ -99,7 +99,7 @@ export function mount(root, context) {
     text.readOnly = !may;
     load.disabled = !mayManage();
     restart.disabled = !(may && state.restarts);
-    devices.may(may);
+    devices.may(mayManage(), may);
     own.may(may);
   }
   const signIn = make("a", "button", t("sign_in_to_set_up"), {

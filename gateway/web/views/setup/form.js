@@ -28,7 +28,12 @@ export function deviceForm(add, note) {
     "aria-label": t("device_where"),
     size: "36",
   });
-  const name = make("input", "", null, { type: "text", placeholder: t("device_name"), "aria-label": t("device_name") });
+  const name = make("input", "", null, {
+    type: "text",
+    placeholder: t("device_name"),
+    "aria-label": t("device_name"),
+    size: "28",
+  });
   const out = make("div", "", null, { role: "status" });
   const device = () => DEVICES.find(([word]) => word === kind.value);
   const address = () => device()[1](where.value.trim());
@@ -57,13 +62,12 @@ export function deviceForm(add, note) {
       );
     },
   });
-  const all = [kind, where, name, look, put];
   return {
     box: make("div", "", [make("div", "buttons", [kind, where, name, look, put]), out]),
-    may(may) {
-      all.forEach((it) => {
-        it.disabled = !may;
-      });
+    /** A device can be tried without a file; adding it needs one. */
+    may(tries, adds) {
+      for (const it of [kind, where, look]) it.disabled = !tries;
+      for (const it of [name, put]) it.disabled = !adds;
     },
   };
 }
