@@ -253,9 +253,11 @@ class HistoryView {
 
   drawFrame() {
     const width = this.to - this.from;
+    // The length between the seconds that are printed.
+    const length = duration(Math.floor(this.to) - Math.floor(this.from));
     say(
       this.text,
-      `${dateTime(this.from * 1000)} – ${width < 86400 ? clock(this.to * 1000) : dateTime(this.to * 1000)} (${duration(width)})`,
+      `${dateTime(this.from * 1000)} – ${width < 86400 ? clock(this.to * 1000) : dateTime(this.to * 1000)} (${length})`,
     );
     // What a person is typing is not overwritten.
     for (const [field, s] of [
