@@ -96,7 +96,9 @@ function drawPerson() {
   const person = context.session.person;
   at("sign-out").hidden = !person;
   say(at("sign-out"), t("sign_out"));
-  link.textContent = person ? `${person.name} (${t(`role_${person.role}`)})` : t("sign_in");
+  link.replaceChildren(
+    ...(person ? [person.name, make("span", "role", ` (${t(`role_${person.role}`)})`)] : [t("sign_in")]),
+  );
   link.href = `/sign-in?next=${encodeURIComponent(location.pathname + location.search)}`;
 }
 

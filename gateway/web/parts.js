@@ -36,10 +36,20 @@ export function fill(element, children) {
   element.replaceChildren(...children.filter(Boolean));
 }
 
+/** A cell with more characters than this is never as narrow as one of its words, nor as one Chinese character. */
+const WORDS_FROM = 8;
+
+/** The class of a cell: a number to the right, a text that needs room for its words. */
+function cellClass(it) {
+  if (it?.num) return "num";
+  const text = it?.text instanceof Node ? it.text.textContent : (it?.text ?? it);
+  return String(text ?? "").length > WORDS_FROM ? "words" : "";
+}
+
 export function table(head, rows, { caption } = {}) {
   const box = make("div", "scroll", null, { tabindex: "0", role: "region", "aria-label": caption });
   const cell = (tag) => (it) =>
-    make(tag, it?.num ? "num" : "", it?.num ?? it?.text ?? it, tag === "th" ? { scope: "col" } : {});
+    make(tag, cellClass(it), it?.num ?? it?.text ?? it, tag === "th" ? { scope: "col" } : {});
   const body = rows.map((cells) => make("tr", "", cells.map(cell("td"))));
   box.append(make("table", "", [make("thead", "", make("tr", "", head.map(cell("th")))), make("tbody", "", body)]));
   return box;
