@@ -32,7 +32,7 @@ export function deviceForm(add, note) {
     type: "text",
     placeholder: t("device_name"),
     "aria-label": t("device_name"),
-    size: "28",
+    size: "32",
   });
   const out = make("div", "", null, { role: "status" });
   const device = () => DEVICES.find(([word]) => word === kind.value);
