@@ -294,10 +294,8 @@ function buttons(found, context) {
   if (found.page) all.push(link(report(found), t("open_report"), { target: "_blank", rel: "noopener" }));
   if (found.steps?.length) all.push(link(`/api/v1/diagnoses/${found.key}/plan?lang=${language()}`, t("plan_csv")));
   if (found.model) all.push(link(`/api/v1/diagnoses/${found.key}/model`, t("download_model")));
-  // An example is of another machine: its model is only there to be looked at. What the machine cannot feed is refused
-  // here, with the reason, and not after a click.
-  const offered = found.model && !found.truth;
-  if (offered && context.status()?.twin && !found.refused) {
+  // What the machine cannot feed, and the model of an example, is refused here, with the reason, and not after a click.
+  if (found.model && context.status()?.twin && !found.refused && !found.truth) {
     const accept = make("button", "", t("accept_model"), {
       type: "button",
       onclick: () => confirmed(accept, found, note),
@@ -305,7 +303,7 @@ function buttons(found, context) {
     accept.disabled = !context.session?.may?.edit;
     all.push(accept);
   }
-  const refused = offered && found.refused ? [make("p", "warn-text", own(found.refused))] : [];
+  const refused = found.model && found.refused ? [make("p", "warn-text", own(found.refused))] : [];
   return make("div", "", [...refused, make("div", "buttons", [...all, note])]);
 }
 
