@@ -245,7 +245,7 @@ fn choose_meters(dialogue: &Dialogue, given: &[String]) -> Result<Vec<String>, C
     }
     let question = (
         "Power meter: an address such as modbus-tcp://192.168.1.20?profile=sdm630 or modbus-rtu:///dev/ttyUSB0?profile=sdm630&unit=1, or none",
-        "电能表:地址如 modbus-tcp://192.168.1.20?profile=sdm630 或 modbus-rtu:///dev/ttyUSB0?profile=sdm630&unit=1,或 none",
+        "功率计:地址如 modbus-tcp://192.168.1.20?profile=sdm630 或 modbus-rtu:///dev/ttyUSB0?profile=sdm630&unit=1,或 none",
     );
     let mut meters = Vec::new();
     loop {
