@@ -83,6 +83,11 @@ fn a_foreign_file_is_dropped_understood_mapped_and_diagnosed_on_the_page() {
     let faults = browser.faults(&address);
     assert!(faults.is_empty(), "{faults:?}");
     new_rule(&mut browser, &address);
+    // A refused request is told among the faults of the browser: they were looked at before.
+    let files = get(&address, "/api/v1/files").json();
+    let key = json!({ "key": files["diagnoses"][0]["key"] });
+    let (status, told) = ask(&mut browser, "POST", "/api/v1/twin/model", &key);
+    assert!((400..500).contains(&status), "the model of an example was taken over: {told}");
     gateway.stop();
 }
 
@@ -95,8 +100,6 @@ fn example(browser: &mut Browser, address: &str) {
     assert_eq!(files["diagnoses"][0]["truth"], "axis", "{files}");
     let refused = &files["diagnoses"][0]["refused"];
     assert!(refused["en"].as_str().is_some_and(|why| why.contains("this is an example")), "{refused}");
-    let (status, told) = ask(browser, "POST", "/api/v1/twin/model", &json!({ "key": files["diagnoses"][0]["key"] }));
-    assert!((400..500).contains(&status), "the model of an example was taken over: {told}");
     let truth = get(address, "/api/v1/gallery/axis/truth").json();
     assert!(truth["en"].as_str().is_some_and(|text| text.contains("Dry friction")), "{truth}");
     println!("the axis of the gallery: {}", files["diagnoses"][0]["summary"]);

@@ -115,7 +115,10 @@ fn greater_cutting_forces_are_noticed_dated_diagnosed_and_shown() {
     assert_eq!(diagnosis["diagnosis"]["schema"], "diagnosis/1");
     assert!(!diagnosis["summary"].as_str().expect("words").is_empty());
     assert!(diagnosis["from_ms"].as_i64() < Some(changed_ms) && diagnosis["to_ms"].as_i64() > Some(changed_ms));
-    assert!(gateway.said().contains("diagnosis:"), "{}", gateway.said());
+    // It is shown a moment before it is said.
+    wait_for("the line of the diagnosis", Duration::from_secs(10), || {
+        gateway.said().contains("diagnosis:").then_some(())
+    });
     gateway.stop();
     let finished = of_twin(records(place, "events"), "diagnosis_finished");
     assert_eq!(finished.len(), 1, "{finished:?}");
