@@ -13,7 +13,7 @@ use adapter_core::reading::{Reading, Stamp};
 use std::f64::consts::TAU;
 use std::time::Duration;
 
-/// The channels of the meter, in the order of [`MeterValues::collect_numbers`].
+/// The channels of the meter, in the order of `MeterValues::collect_numbers`.
 pub const METER_CHANNELS: [&str; 6] = [
     "spindle_power_w",
     "total_power_w",

@@ -23,19 +23,18 @@ fn diagnosed(runs: usize) -> (Json, String, f64) {
 
 #[test]
 fn a_long_recording_is_named_from_pieces_and_told_over_every_row() {
-    let (diagnosis, rows, _) = diagnosed(200);
+    let (diagnosis, rows, _) = diagnosed(140);
     assert_eq!(diagnosis["missing"][0]["effect"], "dry_friction", "{:#}", diagnosis["missing"]);
     let level = &diagnosis["missing"][0]["parameters"][0];
     let bound = |name: &str| level[name].as_f64().expect("a number");
     assert!(bound("low") < 20.0 && 20.0 < bound("high"), "{level}");
-    // Of more than 30,000 rows every second one is compared, and the lines of every row are told.
-    assert_eq!(diagnosis["fit"]["rows"], 20_000);
-    assert_eq!(diagnosis["fit"]["runs"], 200);
-    assert_eq!(diagnosis["fit"]["held_out_runs"].as_array().map(Vec::len), Some(50));
+    assert_eq!(diagnosis["fit"]["rows"], 28_000);
+    assert_eq!(diagnosis["fit"]["runs"], 140);
+    assert_eq!(diagnosis["fit"]["held_out_runs"].as_array().map(Vec::len), Some(35));
     let spans = diagnosis["mismatch"][0]["spans"].as_array().expect("spans");
-    let last = spans.iter().filter(|span| span["run"] == "200").count();
-    assert!(spans.len() >= 200 && last > 0, "spans are complete: {} of them", spans.len());
-    assert_eq!(rows.lines().count(), 40_001);
+    let last = spans.iter().filter(|span| span["run"] == "140").count();
+    assert!(spans.len() >= 140 && last > 0, "spans are complete: {} of them", spans.len());
+    assert_eq!(rows.lines().count(), 28_001);
     let header: Vec<&str> = rows.lines().next().expect("a header").split(',').collect();
     let effect = header.iter().position(|name| *name == "effect_dry_friction").expect("a column");
     let every: Vec<f64> = rows
@@ -44,7 +43,16 @@ fn a_long_recording_is_named_from_pieces_and_told_over_every_row() {
         .map(|row| row.split(',').nth(effect).and_then(|x| x.parse().ok()).expect("a number"))
         .collect();
     let moving = every.iter().filter(|x| (x.abs() - 20.0).abs() < 1.0).count();
-    assert!(moving > 30_000, "the friction acts in every moving row, of any run: {moving}");
+    assert!(moving > 21_000, "the friction acts in every moving row, of any run: {moving}");
+}
+
+/// Of more than 30,000 rows one in so many is compared.
+#[test]
+fn of_a_longer_recording_every_second_row_is_compared_and_every_row_has_a_line() {
+    let (diagnosis, rows, _) = diagnosed(200);
+    assert_eq!(diagnosis["missing"][0]["effect"], "dry_friction", "{:#}", diagnosis["missing"]);
+    assert_eq!(diagnosis["fit"]["rows"], 20_000);
+    assert_eq!(rows.lines().count(), 40_001);
 }
 
 #[test]
