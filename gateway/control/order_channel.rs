@@ -92,7 +92,7 @@ pub struct FactsTaken {
     pub known: usize,
 }
 
-/// Why none of the facts was taken. The same message may be sent again.
+/// Why not all of the facts were taken. The same message may be sent again: what was taken is known then.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum FactsRefused {
     /// What is not stored is not taken.
@@ -173,10 +173,10 @@ impl OrderSender {
         }
     }
 
-    /// Hands the facts of one message to the tick: all are taken, or none.
+    /// Hands the facts of one message to the tick. Where the history stops in the middle of them, those before it are stored.
     ///
     /// # Errors
-    /// Why none was taken.
+    /// Why not all were taken.
     pub async fn send_facts(&self, facts: Vec<Fact>) -> Result<FactsTaken, FactsRefused> {
         let (reply, answered) = oneshot::channel();
         self.facts.try_send(PostedFacts { facts, reply }).map_err(|_full| FactsRefused::Busy)?;

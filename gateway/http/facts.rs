@@ -25,7 +25,7 @@ pub(super) const ROUTES: &[Route] = &[Route::post(Role::Setter, "/api/v1/facts",
 /// The form on the page says so of itself; everything else is a program.
 const FORM: (&str, &str) = ("x-door", "page");
 
-/// `POST /api/v1/facts`: all of them are taken, or none.
+/// `POST /api/v1/facts`: a message with anything wrong in it is refused as a whole.
 async fn add_facts(
     State(shared): State<ServerState>,
     Extension(peer): Extension<Peer>,

@@ -1,7 +1,7 @@
 //! Facts of production on their way in: one form, whatever door they come through.
 //!
 //! HTTP, CSV, MQTT and the page hand over a [`FactDocument`] each; [`FactDocument::check`] makes a [`Fact`] of it or says everything that is wrong.
-//! The tick takes the facts of one message together, all or none ([`OrderSender::send_facts`](super::OrderSender::send_facts)).
+//! A message with anything wrong in it is refused as a whole. The tick takes the others in their order ([`OrderSender::send_facts`](super::OrderSender::send_facts)).
 //!
 //! | `fact` | `value` | `parts` | `until` |
 //! |---|---|---|---|
