@@ -21,7 +21,16 @@ pub(crate) fn estimate_cut_load(scene: &Scene) -> Option<Cow<'_, [f64]>> {
     scene.load().map(Cow::Borrowed).or_else(usual)
 }
 
-/// Rows in which the tool cuts.
+/// Rows in which the tool touches the work, of the share to which it is engaged in each. A pass begins with the first contact: a cutter of
+/// some size is engaged by and by. One partial row alone is the mean of a flag that changed within it, and counts as what it is nearest to.
+#[must_use]
+pub fn mark_contact_rows(engaged: &[f64]) -> Vec<bool> {
+    let touches = |row: Option<usize>| row.and_then(|row| engaged.get(row)).is_some_and(|share| *share > 0.0);
+    let is_ramp = |row: usize| touches(row.checked_sub(1)) && touches(Some(row)) && touches(Some(row + 1));
+    (0..engaged.len()).map(|row| engaged[row] > 0.5 || is_ramp(row)).collect()
+}
+
+/// Rows in which the tool cuts for most of the time.
 pub(crate) fn mark_cutting_rows(scene: &Scene) -> Vec<bool> {
     match scene.role_values(Role::Engaged) {
         Some(engaged) => engaged.iter().map(|engaged| *engaged > 0.5).collect(),
@@ -67,4 +76,18 @@ pub(crate) fn integrate_way_mm(time_s: &[f64], feed_mm_min: &[f64]) -> Vec<f64> 
         way_mm[row] = way_mm[row - 1] + mean_mm_min / 60.0 * (time_s[row] - time_s[row - 1]).max(0.0);
     }
     way_mm
+}
+
+#[cfg(test)]
+mod tests {
+    use super::mark_contact_rows;
+
+    #[test]
+    fn a_cutter_is_in_contact_while_it_is_engaged_by_and_by_and_a_flag_counts_as_what_it_is_nearest_to() {
+        let cutter = [0.0, 0.2, 0.4, 0.6, 1.0, 0.6, 0.4, 0.2, 0.0];
+        assert_eq!(mark_contact_rows(&cutter), [false, false, true, true, true, true, true, false, false]);
+        let mean_of_flag = [0.0, 0.3, 1.0, 1.0, 0.2, 0.0, 0.7, 1.0];
+        assert_eq!(mark_contact_rows(&mean_of_flag), [false, false, true, true, false, false, true, true]);
+        assert_eq!(mark_contact_rows(&[1.0, 0.3, 1.0]), [true; 3], "a cut that is thin for a moment is one pass");
+    }
 }

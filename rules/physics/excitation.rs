@@ -213,6 +213,29 @@ pub(crate) fn build_word_forms(scene: &Scene, name: &'static str, column: &str, 
     words.iter().map(form).collect()
 }
 
+/// Between the units that the place of a form names.
+pub(crate) const UNIT_TO_UNIT: &str = ", ";
+
+/// The place of a form with a term for each word of a text column; `None` where it has no `2..=most` words, or one of them could not be told
+/// from two.
+pub(crate) fn list_units(scene: &Scene, column: &str, most: usize) -> Option<(String, String)> {
+    let words = scene.text_column(column)?.words();
+    let tellable = words.iter().all(|word| !word.contains(UNIT_TO_UNIT));
+    ((2..=most).contains(&words.len()) && tellable).then(|| (column.to_owned(), words.join(UNIT_TO_UNIT)))
+}
+
+/// The form without the units of its place that are not met; as it is where fewer than two are.
+#[must_use]
+pub fn keep_met_units(form: Form, is_met: impl Fn(&str) -> bool) -> Form {
+    let Some((column, named)) = &form.place else { return form };
+    let met: Vec<&str> = named.split(UNIT_TO_UNIT).filter(|unit| is_met(unit)).collect();
+    if met.len() < 2 {
+        return form;
+    }
+    let place = Some((column.clone(), met.join(UNIT_TO_UNIT)));
+    Form { place, ..form }
+}
+
 /// One in the rows where the text column holds the word.
 pub(crate) fn mark_word_rows(scene: &Scene, column: &str, word: &str) -> Option<Vec<f64>> {
     let words = scene.text_column(column)?;

@@ -17,7 +17,8 @@ mod unit;
 
 use adapter_core::channel::quantity::Quantity;
 pub use catalogue::{CATALOGUE, find_effect};
-pub use excitation::{BEGUN, FOLLOWED, format_run_stretch};
+pub use cut::mark_contact_rows;
+pub use excitation::{BEGUN, FOLLOWED, format_run_stretch, keep_met_units};
 pub use scene::{LinearLaw, OutputKind, PAUSE_PERIODS, Role, Scene, SceneError};
 pub use unit::{find_quantity_unit, resolve_unit};
 
@@ -234,6 +235,11 @@ pub trait Effect: Sync + Send {
     /// Does each of its terms belong to an edge or a lot of its own? Without its term a law would say that this one does nothing.
     fn has_term_per_unit(&self, _form: &Form) -> bool {
         false
+    }
+
+    /// The column whose words name those units, where a form names them: its place lists them.
+    fn unit_column(&self, _form: &Form) -> Option<&'static str> {
+        None
     }
 
     /// Does a hidden state (how worn this tool is, a pump on or off, which lot) belong to a tool, lot or stretch, so

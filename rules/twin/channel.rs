@@ -3,7 +3,7 @@
 use adapter_core::channel::quantity::Quantity;
 use physics::drive::{compute_directions, has_both_directions, read_slide_velocity};
 use physics::state::{apply_continuous_lag, apply_first_order_lag};
-use physics::{Role, Scene};
+use physics::{Role, Scene, mark_contact_rows};
 use std::borrow::Cow;
 
 /// Seconds of the recording's clock.
@@ -98,12 +98,12 @@ fn compute_time_in_run_s(scene: &Scene) -> Vec<f64> {
 }
 
 fn compute_time_in_cut_s(scene: &Scene) -> Option<Vec<f64>> {
-    let engaged = scene.role_values(Role::Engaged)?;
+    let in_contact = mark_contact_rows(scene.role_values(Role::Engaged)?);
     let mut values = vec![0.0; scene.rows()];
     for run in scene.runs() {
         let mut since = None;
         for row in run.clone() {
-            since = if engaged[row] > 0.5 { since.or(Some(scene.time_s()[row])) } else { None };
+            since = if in_contact[row] { since.or(Some(scene.time_s()[row])) } else { None };
             values[row] = since.map_or(0.0, |since| scene.time_s()[row] - since);
         }
     }

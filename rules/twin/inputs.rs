@@ -31,7 +31,10 @@ fn list_part_columns(scene: &Scene, part: &Part) -> Vec<String> {
         }
         PartFunction::Effect(effect, _) => {
             let needs = effect.doc().needs.iter().flat_map(|need| need.split('|')).map(str::trim);
-            needs.filter_map(|need| Role::from_name(need).map_or_else(|| Some(need.to_owned()), role)).collect()
+            let needs = needs.filter_map(|need| Role::from_name(need).map_or_else(|| Some(need.to_owned()), role));
+            // Whatever happens in the cut is multiplied by the engagement, where one is recorded.
+            let engagement = (part.is_cut() || effect.doc().family == "cutting").then(|| role(Role::Engaged)).flatten();
+            needs.chain(engagement).collect()
         }
         _ => part.inputs().into_iter().map(str::to_owned).collect(),
     }
@@ -42,21 +45,27 @@ fn list_part_columns(scene: &Scene, part: &Part) -> Vec<String> {
 #[must_use]
 pub fn mark_rows_with_inputs(scene: &Scene, parts: &[Part]) -> Vec<bool> {
     let mut known = vec![true; scene.rows()];
-    let engaged = scene.role_values(Role::Engaged);
+    let is_idle = mark_idle_rows(scene);
     for part in parts {
         for name in list_input_columns(scene, std::slice::from_ref(part)) {
             let Some(absent) = scene.absent_rows(&name) else { continue };
             let mut since = 0;
             for row in 0..scene.rows() {
                 since = if absent[row] { since + 1 } else { 0 };
-                let idle = part.is_cut() && engaged.is_some_and(|engaged| engaged[row] == 0.0);
-                if since > HELD_ROWS_MAX && !idle {
+                if since > HELD_ROWS_MAX && !(part.is_cut() && is_idle[row]) {
                     known[row] = false;
                 }
             }
         }
     }
     known
+}
+
+/// Rows in which the tool is known to be out of the work. An engagement that is held over a gap says nothing of it.
+fn mark_idle_rows(scene: &Scene) -> Vec<bool> {
+    let Some(engaged) = scene.role_values(Role::Engaged) else { return vec![false; scene.rows()] };
+    let absent = scene.role_name(Role::Engaged).and_then(|name| scene.absent_rows(name));
+    (0..scene.rows()).map(|row| engaged[row] == 0.0 && !absent.is_some_and(|absent| absent[row])).collect()
 }
 
 /// Takes rows whose inputs are absent or filled in out of the comparison: what is not recorded is no evidence. Tells them by
@@ -86,13 +95,15 @@ pub fn exclude_rows_without_inputs(scene: &mut Scene, parts: &[Part]) -> Vec<Fau
 /// those of short gaps where gaps are rare. A column that is empty again and again, such as a depth outside the cut or a temperature
 /// that is measured once a minute, has no value to miss there.
 fn list_filled_rows(scene: &Scene, parts: &[Part]) -> Vec<(String, Vec<usize>)> {
-    let engaged = scene.role_values(Role::Engaged);
-    let idle = |row: &usize| engaged.is_some_and(|engaged| engaged[*row] == 0.0);
+    let is_idle = mark_idle_rows(scene);
     let mut of_column: BTreeMap<String, BTreeSet<usize>> = BTreeMap::new();
     for part in parts {
         for name in list_input_columns(scene, std::slice::from_ref(part)) {
             let all = if has_usual_gaps(scene, &name) { &[] } else { scene.filled_rows(&name) };
-            of_column.entry(name).or_default().extend(all.iter().copied().filter(|row| !(part.is_cut() && idle(row))));
+            of_column
+                .entry(name)
+                .or_default()
+                .extend(all.iter().copied().filter(|row| !(part.is_cut() && is_idle[*row])));
         }
     }
     for name in scene.column_names().chain(scene.text_column_names()).filter(|name| *name != scene.output_name()) {

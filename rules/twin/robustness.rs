@@ -111,6 +111,18 @@ fn an_empty_cell_at_the_begin_of_a_cut_is_no_mismatch_and_is_told() {
 }
 
 #[test]
+fn a_gap_over_the_begin_of_a_cut_is_no_mismatch() {
+    let gap: Vec<usize> = (FIRST_OF_CUT - 1..FIRST_OF_CUT + 8).collect();
+    for column in list_inputs() {
+        let found = diagnose_without(column, &gap, 3);
+        assert_eq!(found.verdict, Verdict::NoMismatch, "{column}: {}", found.summary.en);
+    }
+    let found = diagnose_without("engaged", &gap, 3);
+    let compared = found.fit.expect("fitted").rows;
+    assert!(compared <= RUNS * ROWS - gap.len(), "an engagement that is held over a gap is none: {compared} rows");
+}
+
+#[test]
 #[ignore = "2 minutes: every input column with single empty cells and short gaps at many places"]
 fn an_empty_cell_at_any_place_is_no_mismatch() {
     let mut wrong = Vec::new();

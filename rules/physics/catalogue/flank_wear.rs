@@ -1,7 +1,7 @@
 //! Friction on a worn flank: grows with the cutting time of the tool, starts again with a new edge.
 
 use crate::drive::is_displacement;
-use crate::excitation::find_greatest_magnitude;
+use crate::excitation::{UNIT_TO_UNIT, find_greatest_magnitude, list_units};
 use crate::tool_load;
 use crate::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 use numerics::statistics::count_to_f64;
@@ -91,8 +91,6 @@ const fn define_wear_rate(name: &'static str, en: &'static str, zh: &'static str
 
 /// Names of the rates of the edges.
 const RATES: [&str; 8] = ["k_1", "k_2", "k_3", "k_4", "k_5", "k_6", "k_7", "k_8"];
-/// Between the names of the edges.
-const EDGE_TO_EDGE: &str = ", ";
 /// Shares of the longest cutting time in which an edge may break in.
 const BREAK_INS: [f64; 2] = [0.06, 0.2];
 
@@ -117,9 +115,8 @@ impl Effect for FlankWear {
         let powers = [1.0, 0.5, 1.5, 2.5].map(|p| Form::from_shape(&[("p", p)]));
         let break_ins =
             BREAK_INS.map(|share| Form { name: "break_in", ..Form::from_shape(&[("break_in_min", share * longest_min)]) });
-        let edges = list_edges(scene).map(|edges| {
-            let place = Some(("tool".to_owned(), edges.join(EDGE_TO_EDGE)));
-            [1.0, 0.5].map(|p| Form { name: "edges", place: place.clone(), ..Form::from_shape(&[("p", p)]) })
+        let edges = list_units(scene, "tool", RATES.len()).map(|edges| {
+            [1.0, 0.5].map(|p| Form { name: "edges", place: Some(edges.clone()), ..Form::from_shape(&[("p", p)]) })
         });
         powers.into_iter().chain(break_ins).chain(edges.into_iter().flatten()).collect()
     }
@@ -146,7 +143,7 @@ impl Effect for FlankWear {
         }
         let p = form.shape_value("p").unwrap_or(1.0);
         if form.name == "edges" {
-            let named: Vec<&str> = form.place.as_ref()?.1.split(EDGE_TO_EDGE).collect();
+            let named: Vec<&str> = form.place.as_ref()?.1.split(UNIT_TO_UNIT).collect();
             let tools = scene.text_column("tool");
             let own = |row: usize| tools.and_then(|tools| tools.get(row)).filter(|tool| named.contains(tool));
             // An edge that nobody has measured yet wears like the others in the mean.
@@ -164,16 +161,13 @@ impl Effect for FlankWear {
         form.name == "edges"
     }
 
+    fn unit_column(&self, form: &Form) -> Option<&'static str> {
+        self.has_term_per_unit(form).then_some("tool")
+    }
+
     fn has_hidden_state(&self) -> bool {
         true
     }
-}
-
-/// The edges, where there are several and no more than can have a rate of their own.
-fn list_edges(scene: &Scene) -> Option<Vec<&str>> {
-    let edges: Vec<&str> = scene.text_column("tool")?.words().iter().map(String::as_str).collect();
-    let tellable = edges.iter().all(|edge| !edge.contains(EDGE_TO_EDGE));
-    ((2..=RATES.len()).contains(&edges.len()) && tellable).then_some(edges)
 }
 
 /// How much of an edge cuts, mm: the depth of cut, of a drill its radius.

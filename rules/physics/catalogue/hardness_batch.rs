@@ -2,9 +2,10 @@
 
 use crate::cut::{estimate_cut_load, multiply_cut};
 use crate::excitation::{
-    FOLLOWED, compute_ln_count, find_run, follow_step_form, mark_rows_since_run, build_step_forms, mark_word_rows, mark_rows_within_runs, build_word_forms,
+    FOLLOWED, UNIT_TO_UNIT, compute_ln_count, find_run, list_units, follow_step_form, mark_rows_since_run, build_step_forms, mark_word_rows, mark_rows_within_runs, build_word_forms,
 };
 use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
+use numerics::statistics::count_to_f64;
 
 /// Hardness that differs between lots.
 #[derive(Debug, Clone, Copy)]
@@ -107,7 +108,8 @@ impl Effect for HardnessBatch {
         }
         let mut forms = build_word_forms(scene, "lot", "lot", GAINS.len() + 1);
         if forms.len() > 2 {
-            forms.push(Form { name: "lots", ..Form::without_shape() });
+            let units = list_units(scene, "lot", GAINS.len() + 1);
+            forms.extend(units.map(|units| Form { name: "lots", place: Some(units), ..Form::without_shape() }));
         }
         forms.extend(build_lot_step_forms(scene));
         forms
@@ -115,7 +117,7 @@ impl Effect for HardnessBatch {
 
     fn compute_columns(&self, scene: &Scene, form: &Form) -> Option<ParameterColumns> {
         if form.name == "lots" {
-            return compute_recorded_lots(scene);
+            return compute_recorded_lots(scene, form);
         }
         let (column, word) = form.place.as_ref()?;
         if form.name == "stretches" {
@@ -134,6 +136,10 @@ impl Effect for HardnessBatch {
 
     fn has_term_per_unit(&self, form: &Form) -> bool {
         matches!(form.name, "lots" | "stretches")
+    }
+
+    fn unit_column(&self, form: &Form) -> Option<&'static str> {
+        (form.name == "lots").then_some("lot")
     }
 
     fn has_hidden_state(&self) -> bool {
@@ -166,12 +172,9 @@ fn build_lot_step_forms(scene: &Scene) -> Vec<Form> {
     steps
 }
 
-/// Between the runs that begin a lot.
-const LOT_TO_LOT: &str = ", ";
-
 fn compute_inferred_lots(scene: &Scene, starts: &str) -> Option<ParameterColumns> {
     let row = |name: &str| Some(scene.runs()[find_run(scene, name)?].start);
-    let mut rows: Vec<usize> = starts.split(LOT_TO_LOT).map(row).collect::<Option<_>>()?;
+    let mut rows: Vec<usize> = starts.split(UNIT_TO_UNIT).map(row).collect::<Option<_>>()?;
     rows.push(scene.rows());
     let gain = |(gain, lot): (&&'static str, &[usize])| {
         let here = |row: usize| f64::from(u8::from((lot[0]..lot[1]).contains(&row)));
@@ -180,11 +183,19 @@ fn compute_inferred_lots(scene: &Scene, starts: &str) -> Option<ParameterColumns
     GAINS.iter().zip(rows.windows(2)).map(gain).collect()
 }
 
-fn compute_recorded_lots(scene: &Scene) -> Option<ParameterColumns> {
+/// The gain of each lot that the form names against the first of them; without names those of the recording. A lot that nobody has measured
+/// yet is like the others in the mean.
+fn compute_recorded_lots(scene: &Scene, form: &Form) -> Option<ParameterColumns> {
     let lots = scene.text_column("lot")?;
-    let column = |(gain, lot): (&&'static str, &String)| {
-        let here = mark_word_rows(scene, "lot", lot)?;
-        Some((*gain, multiply_cut(scene, |row| here[row])?))
+    let named: Vec<&str> = match &form.place {
+        Some((_, named)) => named.split(UNIT_TO_UNIT).collect(),
+        None => lots.words().iter().map(String::as_str).collect(),
     };
-    GAINS.iter().zip(lots.words().iter().skip(1)).map(column).collect()
+    let own = |row: usize| lots.get(row).filter(|lot| named.contains(lot));
+    let share = |lot: &str, row: usize| match own(row) {
+        Some(own) => f64::from(u8::from(own == lot)),
+        None => 1.0 / count_to_f64(named.len()),
+    };
+    let column = |(gain, lot): (&&'static str, &&str)| Some((*gain, multiply_cut(scene, |row| share(lot, row))?));
+    GAINS.iter().zip(named.iter().skip(1)).map(column).collect()
 }

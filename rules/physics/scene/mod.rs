@@ -2,6 +2,7 @@
 
 mod columns;
 
+use crate::cut::mark_contact_rows;
 use adapter_core::channel::quantity::Quantity;
 use recording::{Recording, Words};
 use std::cell::RefCell;
@@ -226,6 +227,7 @@ impl Scene {
     /// same speed) starts a new one.
     fn find_passes(&self) -> Vec<Range<usize>> {
         let Some(engaged) = self.role_values(Role::Engaged) else { return Vec::new() };
+        let in_contact = mark_contact_rows(engaged);
         let speed = self.role_values(Role::Speed);
         let named = self.text_column("pass");
         let moved = super::tool_load::mark_moved_rows(self);
@@ -240,7 +242,7 @@ impl Scene {
             let jumps = |row: usize| steps(row) && (row + 1 == run.end || !steps(row + 1));
             let mut start = None;
             for row in run.clone() {
-                match (engaged[row] > 0.5, start) {
+                match (in_contact[row], start) {
                     (true, None) => start = Some(row),
                     (true, Some(first)) if jumps(row) => {
                         passes.push(first..row);

@@ -156,6 +156,12 @@ impl EvidenceAnswer {
         Rival { name: instead_of.clone(), instead_of: name.clone(), nats: rival.nats }
     }
 
+    /// Sets a rival beside another of the names.
+    pub(super) fn move_rival(&mut self, rival: &Rival, instead_of: &str) {
+        let is_it = |known: &&mut Rival| known.name == rival.name && known.instead_of == rival.instead_of;
+        self.rivals.iter_mut().filter(is_it).for_each(|known| instead_of.clone_into(&mut known.instead_of));
+    }
+
     /// Takes a rival out; what was likely of it is likely of the name that it stood beside.
     pub(super) fn drop_rival(&mut self, rival: &Rival) {
         self.rivals.retain(|known| known.name != rival.name || known.instead_of != rival.instead_of);

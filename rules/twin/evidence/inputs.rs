@@ -3,7 +3,7 @@
 use crate::hold_out::Unit;
 use numerics::statistics::{count_to_f64, median};
 use physics::drive::{compute_rate, is_axis_output};
-use physics::{OutputKind, Role, Scene};
+use physics::{OutputKind, Role, Scene, mark_contact_rows};
 use std::collections::BTreeSet;
 use std::ops::Range;
 
@@ -92,7 +92,7 @@ impl<'a> RecordingInputs<'a> {
             run,
             unit,
             simulated: scene.simulated_output().map_or_else(|| vec![0.0; rows], <[f64]>::to_vec),
-            in_cut: engaged.as_ref().map_or_else(|| vec![true; rows], |e| e.iter().map(|e| *e > 0.5).collect()),
+            in_cut: engaged.as_ref().map_or_else(|| vec![true; rows], |e| mark_contact_rows(e)),
             speed: own(Role::Speed).map(|n| n.iter().map(|n| n.abs()).collect()),
             velocity: own(Role::Velocity).or_else(|| find_axis_column(scene, "_velocity_mm_min")),
             acceleration: own(Role::Acceleration),

@@ -9,7 +9,7 @@ use crate::candidates::compute_law_columns;
 use crate::model::Part;
 use numerics::linear::columns::{dot, extend_basis, least_squares, project_out};
 use numerics::statistics::rms;
-use physics::{Effect, Entry, Form, find_effect};
+use physics::{Effect, Entry, Form, find_effect, keep_met_units};
 
 /// Forms of one kind from which a fit starts: more of them were measured to help 3 of 33 laws that were stuck.
 const STARTS_MAX: usize = 3;
@@ -143,7 +143,8 @@ impl EvidenceReport<'_, '_> {
         for tangent in &self.baseline.tangents {
             let _ = extend_basis(&mut basis, self.whiten(tangent), 1e-8);
         }
-        let mut left = self.whiten(self.comparison.fixed_and_output().1);
+        let rest: Vec<f64> = self.recorded.iter().zip(&self.inputs.simulated).map(|(y, f)| y - f).collect();
+        let mut left = self.whiten(&rest);
         project_out(&basis, &mut left);
         StartSearch { basis, left }
     }
@@ -161,8 +162,20 @@ impl EvidenceReport<'_, '_> {
             return vec![self.build_start(part.clone(), &columns, search)];
         }
         let Some(effect) = find_effect(kind) else { return Vec::new() };
-        let forms = effect.propose_forms(scene);
+        let forms = self.propose_met_forms(effect);
         forms.iter().filter_map(|form| self.build_form_start(effect, form, search)).collect()
+    }
+
+    /// The forms of a kind; one with a term for each unit has those of the units that the fitted rows have met.
+    pub(super) fn propose_met_forms(&self, effect: &dyn Effect) -> Vec<Form> {
+        let scene = self.inputs.scene;
+        let keep = |form: Form| {
+            let words = effect.unit_column(&form).and_then(|column| scene.text_column(column));
+            let is_met =
+                |unit: &str| words.is_some_and(|w| self.inputs.fitted_rows(false).any(|row| w.get(row) == Some(unit)));
+            if words.is_some() { keep_met_units(form, is_met) } else { form }
+        };
+        effect.propose_forms(scene).into_iter().map(keep).collect()
     }
 
     fn build_form_start(&self, effect: &'static dyn Effect, form: &Form, search: &StartSearch) -> Option<LawStart> {

@@ -68,7 +68,7 @@ impl EvidenceReport<'_, '_> {
         };
         let fits = self.compare_fits(&curve);
         let missing = self.list_missing_effects(&fits, &textbook, written.as_ref());
-        let open = self.list_undetermined_names(&missing);
+        let open = self.list_undetermined_names(&missing, &textbook);
         if self.answer.verdict == Verdict::Explained && !open.is_empty() {
             self.answer.add_unknown_rivals(&open);
         }

@@ -3,6 +3,7 @@
 
 use super::law_starts::StartSearch;
 use super::report::EvidenceReport;
+use super::textbook::Textbook;
 use crate::departure::is_of_departure;
 use crate::diagnosis::{Missing, ParameterEstimate};
 use crate::fit::{Fit, Free};
@@ -24,14 +25,35 @@ fn excludes_zero(estimate: &ParameterEstimate) -> bool {
 
 /// Is its interval no wider than the value, and away from zero?
 pub(super) fn is_determined(estimate: &ParameterEstimate) -> bool {
-    let width = estimate.low.zip(estimate.high).map_or(f64::INFINITY, |(low, high)| high - low);
-    excludes_zero(estimate) && width <= estimate.value.abs()
+    excludes_zero(estimate) && compute_width(estimate) <= estimate.value.abs()
+}
+
+/// Does the recording tell the sizes of a law? The terms of edges and lots are measured by the largest of them: a lot that is like the first
+/// one is known as well as any other.
+fn is_told(part: &Part, estimates: &[ParameterEstimate]) -> bool {
+    if !has_term_per_unit(part) {
+        return estimates.iter().all(is_determined);
+    }
+    let is_size = |estimate: &&ParameterEstimate| {
+        part.find_parameter(&estimate.name).is_some_and(|parameter| parameter.entry == Entry::Linear)
+    };
+    let largest = estimates.iter().filter(is_size).map(|estimate| estimate.value.abs()).fold(0.0, f64::max);
+    let is_narrow = |estimate: &ParameterEstimate| compute_width(estimate) <= largest;
+    let is_known = |estimate: &ParameterEstimate| is_determined(estimate) || is_size(&estimate) && is_narrow(estimate);
+    estimates.iter().any(is_determined) && estimates.iter().all(is_known)
+}
+
+fn has_term_per_unit(part: &Part) -> bool {
+    part.effect_and_form().is_some_and(|(effect, form)| effect.has_term_per_unit(&form))
+}
+
+fn compute_width(estimate: &ParameterEstimate) -> f64 {
+    estimate.low.zip(estimate.high).map_or(f64::INFINITY, |(low, high)| high - low)
 }
 
 /// How many times half its interval a value is.
 fn compute_certainty(estimate: &ParameterEstimate) -> f64 {
-    let half = estimate.low.zip(estimate.high).map_or(f64::INFINITY, |(low, high)| 0.5 * (high - low));
-    estimate.value.abs() / half.max(f64::MIN_POSITIVE)
+    estimate.value.abs() / (0.5 * compute_width(estimate)).max(f64::MIN_POSITIVE)
 }
 
 /// Does an interval reach an end of what is possible?
@@ -93,7 +115,7 @@ impl EvidenceReport<'_, '_> {
 
     /// Does the recording tell every size of the law at a place?
     fn is_law_told(&self, fit: &Fit, place: usize) -> bool {
-        self.estimate_parameters(fit, place).iter().all(is_determined)
+        is_told(&fit.parts[place], &self.estimate_parameters(fit, place))
     }
 
     /// Squares of rows left out up to which a simpler fit stands for this one.
@@ -131,6 +153,7 @@ impl EvidenceReport<'_, '_> {
         let may_be_nothing = |at: &&Free| {
             let (low, high) = parameter(at).range;
             is_of(at, Entry::Linear)
+                && !has_term_per_unit(&fit.parts[at.part])
                 && (low..=high).contains(&0.0)
                 && count_sizes(at.part) > 1
                 && find(at).is_some_and(|estimate| !excludes_zero(estimate))
@@ -150,19 +173,27 @@ impl EvidenceReport<'_, '_> {
             return Some((*shape, parameter(shape).value));
         }
         // The rest of the law stands without the term whose size is known least.
-        let is_of_unit =
-            |part: &Part| part.effect_and_form().is_some_and(|(effect, form)| effect.has_term_per_unit(&form));
         let may_go = |at: &&Free| {
             let (low, high) = parameter(at).range;
             let is_term = (low..=high).contains(&0.0) && count_sizes(at.part) > 1;
-            is_term && is_open(at) && !is_of_unit(&fit.parts[at.part])
+            is_term && is_open(at) && !has_term_per_unit(&fit.parts[at.part])
         };
         free().filter(may_go).min_by(|a, b| certainty(a).total_cmp(&certainty(b))).map(|at| (*at, 0.0))
     }
 
     /// Names that are told as sure although the recording does not tell a size of theirs.
-    pub(super) fn list_undetermined_names(&self, missing: &[Missing]) -> Vec<String> {
-        let open = |missing: &&Missing| !missing.parameters.iter().all(is_determined);
-        missing.iter().filter(open).map(|m| m.effect.clone()).collect()
+    pub(super) fn list_undetermined_names(&self, missing: &[Missing], textbook: &Textbook) -> Vec<String> {
+        let part = |place: usize| textbook.fit.as_ref().and_then(|fit| fit.parts.get(place));
+        let parts = textbook.laws.iter().map(|law| law.and_then(|(place, _)| part(place)));
+        let is_open = |(missing, part): &(&Missing, Option<&Part>)| match part {
+            Some(part) => !is_told(part, &missing.parameters),
+            None => !missing.parameters.iter().all(is_determined),
+        };
+        missing
+            .iter()
+            .zip(parts.chain(std::iter::repeat(None)))
+            .filter(is_open)
+            .map(|(m, _)| m.effect.clone())
+            .collect()
     }
 }

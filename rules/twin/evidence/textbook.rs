@@ -127,7 +127,7 @@ impl EvidenceReport<'_, '_> {
         let tangents: Vec<Vec<f64>> = self.baseline.tangents.iter().map(|tangent| over(tangent)).collect();
         let whole = least_squares(&tangents, &wanted).rss;
         let mut best: Option<(f64, Part)> = None;
-        for form in effect.propose_forms(scene) {
+        for form in self.propose_met_forms(effect) {
             let Some(laws) = effect.compute_columns(scene, &form) else { continue };
             let mut columns: Vec<Vec<f64>> = laws.iter().map(|(_, law)| over(law)).collect();
             let own = columns.len();

@@ -46,7 +46,9 @@ impl EvidenceReport<'_, '_> {
             // What it stands beside may have given way to another name meanwhile.
             let Some(known) = self.answer.rivals.iter().find(|known| known.name == rival.name) else { continue };
             rival.instead_of.clone_from(&known.instead_of);
-            let Some((other, prediction)) = self.write_with_rival(&rival) else { continue };
+            let Some((instead_of, other, prediction)) = self.write_in_best_place(&rival) else { continue };
+            self.answer.move_rival(&rival, &instead_of);
+            rival.instead_of = instead_of;
             if list_followed(&other.0) != list_followed(&told.0) {
                 continue;
             }
@@ -73,6 +75,24 @@ impl EvidenceReport<'_, '_> {
             log_likelihood: -0.5 * rows * square.ln(),
             error: self.compute_told_rmse(&written.total)?,
         })
+    }
+
+    /// The names with `rival` in the place of the one that it replaces best: of two causes it may stand for the one that it was not listed
+    /// beside.
+    fn write_in_best_place(&mut self, rival: &Rival) -> Option<(String, (Textbook, WrittenModel), WrittenPrediction)> {
+        let mut best: Option<(String, (Textbook, WrittenModel), WrittenPrediction)> = None;
+        for name in self.answer.names.clone() {
+            if name == UNKNOWN || name == rival.name {
+                continue;
+            }
+            let placed = Rival { instead_of: name.clone(), ..rival.clone() };
+            let Some((written, prediction)) = self.write_with_rival(&placed) else { continue };
+            let is_best = best.as_ref().is_none_or(|(_, _, known)| prediction.log_likelihood > known.log_likelihood);
+            if is_best {
+                best = Some((name, written, prediction));
+            }
+        }
+        best
     }
 
     /// The names with `rival` in its place, as they would be written; `None` where one of them has no law or an impossible one.
