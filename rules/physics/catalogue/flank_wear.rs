@@ -1,7 +1,7 @@
 //! Friction on a worn flank: grows with the cutting time of the tool, starts again with a new edge.
 
 use crate::drive::is_displacement;
-use crate::excitation::find_greatest_magnitude;
+use numerics::statistics::find_greatest_magnitude;
 use crate::tool_load;
 use crate::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 use numerics::statistics::count_to_f64;
