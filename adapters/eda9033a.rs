@@ -15,9 +15,9 @@ use crate::driver::{Fact, Source, SourceError, SourceProblem};
 use crate::electric::{Doubts, SupplyCheck, SupplyValues};
 pub use crate::modbus::line::{ModbusError, serial_fault, serial_silence};
 use crate::reading::{Reading, Stamp};
-use crate::serial::{Bus, SharedBus, wire_time};
 use adapter_core::integer::saturate_to_wait_ns;
-use adapter_core::serial::LineConflict;
+use device_line::serial::LineConflict;
+use device_line::serial::{Bus, SharedBus, wire_time};
 use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
@@ -175,7 +175,7 @@ impl Source for Eda9033a {
 
     fn period(&self) -> Duration {
         let target = self.bus.lock().unwrap_or_else(PoisonError::into_inner).target().clone();
-        let wire = wire_time(&target, REQUEST_BYTES + ANSWER_BYTES) + 2 * crate::serial::compute_silence(&target);
+        let wire = wire_time(&target, REQUEST_BYTES + ANSWER_BYTES) + 2 * device_line::serial::compute_silence(&target);
         (wire * 5 / 4).max(Duration::from_millis(100))
     }
 

@@ -7,6 +7,7 @@
 //! | crate | what | uses |
 //! |---|---|---|
 //! | [`adapter_core`] | channels, readings, merging, what every driver needs | |
+//! | [`device_line`] | TLS, serial lines, child processes around a vendor's library | `adapter_core` |
 //! | [`recording`](mod@recording) | recordings in every format that is read | `adapter_core`, `mtconnect` |
 //! | [`simulated`] | the built-in machine | `adapter_core` |
 //! | [`mqtt`] | a client of MQTT | `adapter_core` |
@@ -36,9 +37,10 @@ pub mod waveform;
 pub mod worker;
 
 pub use adapter_core::{
-    bilingual, channel, child, clock, conversion, driver, electric, histogram, merge, offset, own, plausibility,
-    reading, sample, serial, text, threads, tls, unique_id, units, words,
+    bilingual, channel, clock, conversion, driver, electric, histogram, merge, offset, own, plausibility, reading,
+    sample, text, threads, unique_id, units, words,
 };
+pub use device_line;
 pub use fanuc;
 pub use fanuc_server;
 pub use hnc;

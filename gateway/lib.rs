@@ -2,16 +2,18 @@
 //!
 //! | crate | what | uses |
 //! |---|---|---|
-//! | [`gateway_base`] | clock, messages, files | |
-//! | [`gateway_history`] | everything in SQLite | `gateway_base` |
-//! | [`gateway_gate`] | the only way to the controller | `gateway_history` |
+//! | `gateway_files` | files that are replaced, noticed, owned | |
+//! | `gateway_records` | what is remembered besides samples, one type per kind of row | |
+//! | [`gateway_base`] | clock, messages | `gateway_files` |
+//! | [`gateway_history`] | everything in SQLite | `gateway_base`, `gateway_records` |
+//! | [`gateway_gate`] | the only way to the controller | `gateway_files`, `gateway_records` |
 //! | [`gateway_control`] | orders to a running box | `gateway_history` |
 //! | [`gateway_nats`] | a client of NATS JetStream | `gateway_base` |
 //! | [`gateway_sinks`] | what leaves the box | `gateway_control`, `gateway_nats` |
 //! | [`gateway_fleet`] | from NATS JetStream into PostgreSQL | `gateway_sinks` |
 //! | [`gateway_diagnosis`] | the twin at work, and its report | `gateway_history` |
 //! | [`gateway_commission`] | from measurements in the workshop to models | `gateway_diagnosis` |
-//! | [`gateway_pipeline`] | from a sample to estimates, decisions and records | `gateway_gate` |
+//! | [`gateway_pipeline`] | from a sample to estimates, decisions and records | `gateway_gate`, `gateway_history` |
 //! | [`gateway_config`] | the configuration file | `gateway_pipeline`, `gateway_sinks` |
 //! | [`gateway_status`] | what the box says of itself; delays of its sources | `gateway_config`, `gateway_diagnosis` |
 //! | [`gateway_sources`] | from the configuration to samples; what an address answers | `gateway_status` |

@@ -1,7 +1,7 @@
 //! What follows the question mark of a `fanuc://` address.
 
+use crate::axis_name::AxisName;
 use crate::dial::Dial;
-use crate::extra::AxisName;
 use crate::feed_override;
 use crate::item::{Area, Position};
 use crate::own_item::OwnItem;

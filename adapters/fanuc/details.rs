@@ -55,6 +55,12 @@ pub(super) fn list_channels(details: bool) -> Vec<ChannelId> {
     names.take(if details { usize::MAX } else { 2 }).filter_map(ChannelId::from_name).collect()
 }
 
+/// What changes slowly: parts and gear stage, without the details that a source asks for besides.
+#[must_use]
+pub fn list_slow_questions(path: u8) -> Vec<Question> {
+    list_questions(path, false)
+}
+
 /// What is asked for.
 pub(super) fn list_questions(path: u8, details: bool) -> Vec<Question> {
     let others = [

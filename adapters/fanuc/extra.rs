@@ -1,6 +1,7 @@
 //! Channels besides those of the table: further axes and spindles by their own names, and the user's own. They are declared
 //! when the source is opened, and travel with the quick or with the slow group.
 
+use super::axis_name::AxisName;
 use super::item::{FocasItem, Position, Question, Servo, Spindle};
 use super::line::Asked;
 use super::own_item::OwnItem;
@@ -13,43 +14,9 @@ use adapter_core::own::{Own, ReadWith};
 use adapter_core::reading::{Absence, Reading, Stamp, Value};
 use adapter_core::text::TextEncoding;
 
-/// An axis that has channels of its own.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct AxisName {
-    /// Its name on the control: a letter, or a letter and a number.
-    pub name: String,
-    /// Does it turn? Its positions are degrees then.
-    pub rotary: bool,
-    /// Path from 1; `None` is the one that is written to.
-    pub path: Option<u8>,
-}
-
-impl AxisName {
-    /// `X1`, `B`, `W:deg`, or `Z2@2` of path 2. A, B and C turn unless `:mm` says otherwise, by custom.
-    #[must_use]
-    pub fn read(text: &str) -> Option<Self> {
-        let (text, path) = match text.split_once('@') {
-            Some((text, path)) => (text, Some(path.parse().ok().filter(|path| (1..=10).contains(path))?)),
-            None => (text, None),
-        };
-        let (name, unit) = text.split_once(':').map_or((text, None), |(name, unit)| (name, Some(unit)));
-        let usable = (1..=3).contains(&name.len())
-            && name.starts_with(|letter: char| letter.is_ascii_alphabetic())
-            && name.chars().all(|letter| letter.is_ascii_alphanumeric());
-        let name = name.to_ascii_uppercase();
-        let rotary = match unit {
-            None => name.starts_with(['A', 'B', 'C']),
-            Some("deg") => true,
-            Some("mm") => false,
-            Some(_) => return None,
-        };
-        usable.then_some(Self { name, rotary, path })
-    }
-}
-
-/// What of an axis.
+/// A quantity of an axis that has a channel of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Of {
+enum AxisQuantity {
     Position(Position),
     Load,
     Current,
@@ -62,10 +29,10 @@ enum Of {
 const MOTOR_TEMPERATURE: FocasItem = FocasItem::Diagnosis(308, -1);
 const ENCODER_TEMPERATURE: FocasItem = FocasItem::Diagnosis(309, -1);
 
-/// Where a further channel comes from.
+/// Where the value of a further channel comes from.
 #[derive(Debug, Clone, PartialEq)]
-enum From {
-    Axis(AxisName, Of),
+enum ExtraOrigin {
+    Axis(AxisName, AxisQuantity),
     /// A quantity of the spindle at this place, counted from 0.
     Spindle(usize, Spindle),
     Own(Own<OwnItem>),
@@ -77,7 +44,7 @@ pub struct Extra {
     /// Its place in the table of channels.
     pub channel: ChannelId,
     path: u8,
-    from: From,
+    origin: ExtraOrigin,
 }
 
 const PLACES: (f64, f64) = (-1e6, 1e6);
@@ -86,7 +53,7 @@ const CURRENTS: (f64, f64) = (-1000.0, 1000.0);
 const TEMPERATURES: (f64, f64) = (-50.0, 300.0);
 const SPEEDS: (f64, f64) = (-100_000.0, 100_000.0);
 
-impl Of {
+impl AxisQuantity {
     fn to_item(self) -> FocasItem {
         match self {
             Self::Position(which) => FocasItem::Position(which, -1),
@@ -143,7 +110,7 @@ pub fn declare_channels(options: &FanucOptions, path: u8) -> Result<Vec<(ReadWit
             let new = NewChannel { name, unit: unit.to_owned(), range, kind, en, zh };
             extras.push((
                 of.choose_pace(),
-                declare_extra(&new, axis.path.unwrap_or(path), From::Axis(axis.clone(), of))?,
+                declare_extra(&new, axis.path.unwrap_or(path), ExtraOrigin::Axis(axis.clone(), of))?,
             ));
         }
     }
@@ -155,34 +122,47 @@ pub fn declare_channels(options: &FanucOptions, path: u8) -> Result<Vec<(ReadWit
             let name = format!("spindle{number}_{ending}");
             let (en, zh) = (format!("Spindle {number}: {en}"), format!("主轴{number}{zh}"));
             let new = NewChannel { name, unit: unit.to_owned(), range, kind: Kind::Continuous, en, zh };
-            extras.push((ReadWith::Fast, declare_extra(&new, path, From::Spindle(usize::from(number) - 1, what))?));
+            extras.push((
+                ReadWith::Fast,
+                declare_extra(&new, path, ExtraOrigin::Spindle(usize::from(number) - 1, what))?,
+            ));
         }
     }
     for own in &options.own {
         let path = own.channel.path.unwrap_or(path);
-        extras.push((own.channel.pace, Extra { channel: own.id, path, from: From::Own(own.clone()) }));
+        extras.push((own.channel.pace, Extra { channel: own.id, path, origin: ExtraOrigin::Own(own.clone()) }));
     }
     Ok(extras)
 }
 
-fn list_quantities(options: &FanucOptions) -> Vec<Of> {
-    let positions = [Position::Machine].into_iter().chain(options.positions.iter().copied()).map(Of::Position);
-    positions.chain([Of::Load, Of::Current, Of::MotorTemperature, Of::EncoderTemperature]).collect()
+fn list_quantities(options: &FanucOptions) -> Vec<AxisQuantity> {
+    let positions =
+        [Position::Machine].into_iter().chain(options.positions.iter().copied()).map(AxisQuantity::Position);
+    positions
+        .chain([
+            AxisQuantity::Load,
+            AxisQuantity::Current,
+            AxisQuantity::MotorTemperature,
+            AxisQuantity::EncoderTemperature,
+        ])
+        .collect()
 }
 
-fn declare_extra(new: &NewChannel, path: u8, from: From) -> Result<Extra, (String, DeclareError)> {
+fn declare_extra(new: &NewChannel, path: u8, origin: ExtraOrigin) -> Result<Extra, (String, DeclareError)> {
     let channel = declare_channel(new).map_err(|error| (new.name.clone(), error))?;
-    Ok(Extra { channel, path, from })
+    Ok(Extra { channel, path, origin })
 }
 
 impl Extra {
     /// What has to be asked for: its item, and the unit of a position.
     pub fn list_questions(&self) -> impl Iterator<Item = Question> {
-        let (item, unit) = match &self.from {
-            From::Axis(_, of @ Of::Position(which)) => (of.to_item(), Some(FocasItem::PositionUnit(which.frame()))),
-            From::Axis(_, of) => (of.to_item(), None),
-            From::Spindle(_, what) => (FocasItem::Spindles(*what), None),
-            From::Own(own) => (own.item.item, None),
+        let (item, unit) = match &self.origin {
+            ExtraOrigin::Axis(_, of @ AxisQuantity::Position(which)) => {
+                (of.to_item(), Some(FocasItem::PositionUnit(which.frame())))
+            }
+            ExtraOrigin::Axis(_, of) => (of.to_item(), None),
+            ExtraOrigin::Spindle(_, what) => (FocasItem::Spindles(*what), None),
+            ExtraOrigin::Own(own) => (own.item.item, None),
         };
         let path = self.path;
         std::iter::once(item).chain(unit).map(move |item| item.to_question(path))
@@ -191,7 +171,7 @@ impl Extra {
     /// The channel's reading of what was answered. `encoding` is the character set of the source.
     pub(super) fn to_reading(&self, asked: &Asked, stamp: Stamp, encoding: TextEncoding) -> Reading {
         let view = View { asked, path: self.path };
-        if let From::Own(own) = &self.from {
+        if let ExtraOrigin::Own(own) = &self.origin {
             let found = view
                 .find_answer(own.item.item)
                 .and_then(|answer| own.item.extract_value(&own.channel, answer, encoding));
@@ -201,20 +181,28 @@ impl Extra {
     }
 
     fn read(&self, view: &View<'_>) -> OrAbsence<Value> {
-        match &self.from {
-            From::Axis(axis, Of::Position(which)) => {
+        match &self.origin {
+            ExtraOrigin::Axis(axis, AxisQuantity::Position(which)) => {
                 to_number_value(view.find_position(*which, &axis.name, axis.rotary))
             }
-            From::Axis(axis, Of::Load) => to_number_value(view.axis_load(&axis.name)),
-            From::Axis(axis, of @ Of::Current) => to_number_value(view.find_axis_value(of.to_item(), &axis.name)),
-            From::Axis(axis, of) => {
+            ExtraOrigin::Axis(axis, AxisQuantity::Load) => to_number_value(view.axis_load(&axis.name)),
+            ExtraOrigin::Axis(axis, of @ AxisQuantity::Current) => {
+                to_number_value(view.find_axis_value(of.to_item(), &axis.name))
+            }
+            ExtraOrigin::Axis(axis, of) => {
                 to_number_value(view.find_number_at(of.to_item(), view.find_axis_place(&axis.name)?))
             }
-            From::Spindle(at, Spindle::Load) => to_number_value(view.spindle_load(*at)),
-            From::Spindle(at, what) => to_number_value(view.find_number_at(FocasItem::Spindles(*what), *at)),
-            From::Own(_) => Err(Absence::NotSupported),
+            ExtraOrigin::Spindle(at, Spindle::Load) => to_number_value(view.spindle_load(*at)),
+            ExtraOrigin::Spindle(at, what) => to_number_value(view.find_number_at(FocasItem::Spindles(*what), *at)),
+            ExtraOrigin::Own(_) => Err(Absence::NotSupported),
         }
     }
+}
+
+/// The readings of channels that an address or a configuration adds.
+pub(super) fn append_extra_readings(extras: &[Extra], asked: &Asked, encoding: TextEncoding, out: &mut Vec<Reading>) {
+    let stamp = Stamp::of_request(asked.began_ns, asked.ended_ns);
+    out.extend(extras.iter().map(|extra| extra.to_reading(asked, stamp, encoding)));
 }
 
 #[cfg(test)]

@@ -56,12 +56,14 @@ pub mod address;
 pub mod alarms;
 pub mod allow_list;
 pub mod answer;
+pub mod axis_name;
 pub mod code;
 pub mod decode;
 mod details;
 pub mod dial;
 pub mod extra;
 pub mod facts;
+mod fast_channels;
 pub mod feed_override;
 pub mod focas;
 pub mod generation;
@@ -69,6 +71,7 @@ pub mod item;
 pub mod ladder;
 mod ladder_request;
 pub mod line;
+mod manner;
 pub mod native;
 pub mod open;
 pub mod own_item;
@@ -88,6 +91,8 @@ mod view;
 pub mod wire;
 mod word;
 pub mod work_offset;
+
+pub use details::list_slow_questions;
 
 #[cfg(test)]
 mod line_tests;

@@ -95,9 +95,3 @@ pub const MOTOR_TEMPERATURE: FocasItem = FocasItem::Diagnosis(403, 1);
 pub fn build_power_item(diagnosis: u16) -> FocasItem {
     FocasItem::Diagnosis(diagnosis, 1)
 }
-
-/// What changes slowly: parts and gear stage, without the details that a source asks for besides.
-#[must_use]
-pub fn list_slow_questions(path: u8) -> Vec<Question> {
-    super::details::list_questions(path, false)
-}

@@ -1,13 +1,14 @@
 //! The groups of a controller as sources.
 
 use super::details;
-use super::extra::Extra;
+use super::extra::{Extra, append_extra_readings};
 use super::facts::Facts;
 use super::item::{FocasItem, Question};
 use super::line::{Asked, FanucLine};
+use super::manner::Manner;
 use super::poll;
 use super::poll_period::{GroupPace, SharedPace};
-use super::readings::{self, Manner};
+use super::readings::{self, FastColumn};
 use crate::address::FanucOptions;
 use adapter_core::channel::{ChannelId, on_path};
 use adapter_core::clock::Clock;
@@ -30,8 +31,8 @@ pub struct FanucSource {
     line: FanucLine,
     group: PolledGroup,
     questions: Vec<Question>,
-    /// Each path with its channels at the places of [`readings::list_columns`]; the slow group has them in its order.
-    paths: Vec<(Manner, Vec<Option<ChannelId>>)>,
+    /// Each path with the channels of the fast group; the slow group has none here.
+    paths: Vec<(Manner, Vec<FastColumn>)>,
     channels: Vec<ChannelId>,
     /// Channels that the address and the configuration add to this group.
     extras: Vec<Extra>,
@@ -59,16 +60,16 @@ impl FanucSource {
     ) -> Self {
         let power = manner.power_diagnosis;
         // Whatever its number, the path that is written to has the plain names.
-        let own = readings::list_columns(None, power.map(|_| readings::POWER));
+        let own = readings::list_columns(None, power.is_some());
         let further =
-            options.further.iter().map(|path| (manner.of_further(*path), readings::list_columns(Some(*path), [])));
+            options.further.iter().map(|path| (manner.of_further(*path), readings::list_columns(Some(*path), false)));
         let paths: Vec<_> = std::iter::once((manner, own)).chain(further).collect();
         let mut questions = poll::list_fast_questions(manner.path);
         questions.extend(power.map(|number| poll::build_power_item(number).to_question(manner.path)));
         questions.extend(manner.dial.map(|dial| FocasItem::Pmc(dial.to_stretch()).to_question(manner.path)));
         questions.extend(options.further.iter().flat_map(|path| poll::list_further_questions(*path)));
         add(&mut questions, &extras);
-        let own = paths.iter().flat_map(|(_, columns)| columns.iter().copied().flatten());
+        let own = paths.iter().flat_map(|(_, columns)| columns.iter().map(|column| column.channel));
         let channels = own.chain(extras.iter().map(|extra| extra.channel)).collect();
         let (name, pace) = (name.to_owned(), shared.add_group(options.period));
         Self {
@@ -154,7 +155,7 @@ impl Source for FanucSource {
                 compute_busy_time(&asked) + further.as_ref().map(compute_busy_time).unwrap_or_default(),
             );
             details::append_readings(&asked, further.as_ref(), self.details, out);
-            readings::append_extra_readings(&self.extras, &asked, self.encoding, out);
+            append_extra_readings(&self.extras, &asked, self.encoding, out);
             return Ok(());
         }
         let alarms = self.ask_alarms(clock, &asked)?;
@@ -164,7 +165,7 @@ impl Source for FanucSource {
         for (manner, columns) in &self.paths {
             readings::append_fast_readings(columns, &asked, alarms.as_ref(), *manner, out);
         }
-        readings::append_extra_readings(&self.extras, &asked, self.encoding, out);
+        append_extra_readings(&self.extras, &asked, self.encoding, out);
         Ok(())
     }
 
@@ -196,8 +197,8 @@ impl Source for FanucSource {
 /// The channels that a control delivers by itself, of the path with the plain names.
 #[must_use]
 pub fn list_delivered(options: &FanucOptions) -> Vec<ChannelId> {
-    let power = options.power_diagnosis.map(|_| readings::POWER);
-    let mut channels: Vec<ChannelId> = readings::list_columns(None, power).into_iter().flatten().collect();
+    let columns = readings::list_columns(None, options.power_diagnosis.is_some());
+    let mut channels: Vec<ChannelId> = columns.into_iter().map(|column| column.channel).collect();
     channels.extend(details::list_channels(options.details));
     channels
 }

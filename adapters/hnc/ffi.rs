@@ -3,7 +3,7 @@
 
 #![allow(unsafe_code, reason = "calls into a foreign library")]
 
-use adapter_core::child::{Guarded, functions};
+use device_line::child::{Guarded, functions};
 use std::ffi::{CStr, c_char, c_long, c_void};
 
 functions! {

@@ -2,7 +2,7 @@
 
 use super::profile::ProfileError;
 use adapter_core::channel::ChannelId;
-use adapter_core::serial::LineConflict;
+use device_line::serial::LineConflict;
 use thiserror::Error;
 
 /// An address or a profile that makes no meter.

@@ -21,7 +21,7 @@ use adapter_core::energy_count::EnergyCount;
 use adapter_core::integer::count_to_f64;
 use adapter_core::own::Own;
 use adapter_core::reading::{Absence, Reading};
-use adapter_core::serial::Bus;
+use device_line::serial::Bus;
 use std::ops::Range;
 use std::time::Duration;
 

@@ -9,7 +9,7 @@ use super::pdu::{RegisterBlock, RegisterTable};
 use super::register::MeterRegister;
 use adapter_core::address::SerialTarget;
 use adapter_core::integer::convert_bounded;
-use adapter_core::serial;
+use device_line::serial;
 use std::time::Duration;
 
 /// More requests than this in one poll are a sign of a profile that should be two.

@@ -9,7 +9,7 @@ use super::line::{ModbusError, ModbusLine, ModbusResponse, serial_fault, serial_
 use adapter_core::clock::Clock;
 use adapter_core::integer::saturate_to_wait_ns;
 use adapter_core::reading::Stamp;
-use adapter_core::serial::{Bus, SharedBus, wire_time};
+use device_line::serial::{Bus, SharedBus, wire_time};
 use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 

@@ -7,7 +7,7 @@ use super::reader::{PacketWriter, READ_PAUSE, Reader};
 use super::{MqttError, MqttMessage, Options, Version, words};
 use adapter_core::address::Endpoint;
 use adapter_core::stream;
-use adapter_core::tls::{TcpConnection, TlsError, TlsFiles};
+use device_line::tls::{TcpConnection, TlsError, TlsFiles};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::thread::JoinHandle;

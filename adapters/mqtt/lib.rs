@@ -27,7 +27,7 @@ pub use client::MqttClient;
 pub use packet::Qos;
 pub use publishing::Outgoing;
 
-use adapter_core::tls::{TlsError, TlsFiles};
+use device_line::tls::{TlsError, TlsFiles};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 

@@ -6,7 +6,7 @@ use super::packet::{PING, encode_puback};
 use super::{MqttError, MqttMessage, words};
 use adapter_core::stream::is_silence;
 use adapter_core::threads::reach_fault_point;
-use adapter_core::tls::TcpConnection;
+use device_line::tls::TcpConnection;
 use std::io::ErrorKind;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};

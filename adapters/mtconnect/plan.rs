@@ -4,7 +4,7 @@ use crate::address::MtConnectTarget;
 use crate::model::{Category, DataItem, Device};
 use crate::own_data_item::OwnDataItem;
 use crate::place::{ComponentPlace, find_path, find_places, name_component};
-use crate::rows::{ChannelRow, LETTERS, ROWS, TEMPERATURE, TEMPERATURES, Where};
+use crate::rows::{ChannelRow, LETTERS, ROWS, RowPlace, TEMPERATURE, TEMPERATURES};
 use crate::standard::find_unit;
 use crate::streams::ConditionLevel;
 use crate::words::ObservationForm;
@@ -61,8 +61,8 @@ pub fn list_channels(target: &MtConnectTarget) -> Vec<ChannelId> {
     let mut names: Vec<String> = Vec::new();
     for row in ROWS {
         match row.place {
-            Where::Axis => names.extend(LETTERS.map(|letter| name_axis_channel(letter, row.channel))),
-            Where::Control => {
+            RowPlace::Axis => names.extend(LETTERS.map(|letter| name_axis_channel(letter, row.channel))),
+            RowPlace::Control => {
                 names.extend((0..target.paths.len()).map(|at| name_path_channel(&target.paths, at, row.channel)))
             }
             _ => names.push(row.channel.to_owned()),
@@ -300,8 +300,8 @@ fn find_row_channel(
     component: usize,
 ) -> Option<ChannelId> {
     let name = match (row.place, places.get(component)?) {
-        (Where::Axis, ComponentPlace::Linear(letter)) => name_axis_channel(*letter, row.channel),
-        (Where::Control, _) => {
+        (RowPlace::Axis, ComponentPlace::Linear(letter)) => name_axis_channel(*letter, row.channel),
+        (RowPlace::Control, _) => {
             let path = find_path(device, places, component);
             let at = path.map_or(Some(0), |path| target.paths.iter().position(|known| *known == path))?;
             name_path_channel(&target.paths, at, row.channel)

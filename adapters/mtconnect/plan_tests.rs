@@ -172,7 +172,7 @@ fn every_row_names_a_channel_of_the_table_and_the_list_holds_each_once() {
     let both = MtConnectTarget { paths: vec![1, 2, 3], ..target() };
     let channels = list_channels(&both);
     for row in ROWS {
-        let name = if row.place == Where::Axis { format!("x_{}", row.channel) } else { row.channel.to_owned() };
+        let name = if row.place == RowPlace::Axis { format!("x_{}", row.channel) } else { row.channel.to_owned() };
         assert!(ChannelId::from_name(&name).is_some_and(|id| channels.contains(&id)), "{name}");
     }
     let mut unique = channels.clone();

@@ -8,7 +8,7 @@ use crate::words::ObservationForm;
 
 /// Kinds of places that a row looks at, the likeliest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Where {
+pub(crate) enum RowPlace {
     /// A path, or the control as a whole.
     Control,
     Spindle,
@@ -21,7 +21,7 @@ pub(crate) enum Where {
     Environment,
 }
 
-impl Where {
+impl RowPlace {
     /// How likely a place is; `None` where it is none of these.
     pub(crate) fn rank_place(self, place: ComponentPlace) -> Option<usize> {
         match (self, place) {
@@ -43,7 +43,7 @@ impl Where {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ChannelRow {
     pub(crate) channel: &'static str,
-    pub(crate) place: Where,
+    pub(crate) place: RowPlace,
     pub(crate) kind: &'static str,
     pub(crate) sub_types: &'static [&'static str],
     pub(crate) form: ObservationForm,
@@ -51,7 +51,7 @@ pub(crate) struct ChannelRow {
 
 const fn define_row(
     channel: &'static str,
-    place: Where,
+    place: RowPlace,
     kind: &'static str,
     sub_types: &'static [&'static str],
     form: ObservationForm,
@@ -66,7 +66,7 @@ const PROGRAMMED: &[&str] = &["PROGRAMMED", "COMMANDED"];
 const OVERRIDE: &[&str] = &["OVERRIDE"];
 
 use ObservationForm::{Block, Coordinate, EmergencyStop, Execution, Mode, Number, Program, Text, Tool};
-use Where::{Axis, Control, Coolant, Environment, Spindle, SpindleMotor, Supply};
+use RowPlace::{Axis, Control, Coolant, Environment, Spindle, SpindleMotor, Supply};
 
 /// Every row, the likeliest of a channel first.
 #[rustfmt::skip]

@@ -4,11 +4,11 @@ use crate::OwnPath;
 use crate::mailbox::{ControllerRegister, Mailbox};
 use crate::offset_mailbox::OffsetMailbox;
 use adapter_core::address::{
-    AddressProblem, Endpoint, Keys, Login, WaveformKeep, parse_encoding, parse_endpoint, parse_waveform_keep, tls_files,
+    AddressProblem, Endpoint, Keys, Login, WaveformKeep, parse_encoding, parse_endpoint, parse_waveform_keep,
 };
 use adapter_core::own::Own;
 use adapter_core::text::TextEncoding;
-use adapter_core::tls::TlsFiles;
+use device_line::tls::TlsFiles;
 use thiserror::Error;
 
 /// A Huazhong controller behind a broker.
@@ -58,7 +58,7 @@ pub enum NcLinkAddressError {
 /// # Errors
 /// What is missing.
 pub fn parse_nclink(body: &str, keys: &mut Keys, tls: bool) -> Result<NcLinkTarget, NcLinkAddressError> {
-    let (login, files) = (Login::from_keys(keys), tls_files(keys, tls));
+    let (login, files) = (Login::from_keys(keys), TlsFiles::from_keys(keys, tls));
     let period_ms = keys.take_number("period_ms", 100, 10, 60_000);
     let f_channel = keys.take_number("f_channel", 2560, 0, 65_535);
     let spindle_axis = keys.take_optional_number("spindle_axis", 0, 63);

@@ -7,7 +7,7 @@ use crate::address::NcLinkTarget;
 use adapter_core::driver::SourceError;
 use adapter_core::integer::saturate_to_ms;
 use adapter_core::text::TextEncoding;
-use adapter_core::tls::TlsFiles;
+use device_line::tls::TlsFiles;
 use mqtt::{self, MqttClient, MqttError, MqttMessage, Qos};
 use serde_json::{Value, json};
 use std::collections::VecDeque;

@@ -1,7 +1,7 @@
 //! What one set of scripts did on its way through the history.
 
 use super::compare::{Spell, SpellKind};
-use super::to_seconds;
+
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_pipeline::Tally;
 use rules::estimators::State;
@@ -236,4 +236,9 @@ fn is_spell_of(spell: &Spell, request: &StopRequest) -> bool {
     spell.kind == SpellKind::Stop
         && *spell.name == *request.stop.as_word()
         && request.stop.is_same_request(&spell.text, &request.reason)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "2^53 ns are a hundred days; beyond that microseconds suffice")]
+pub(crate) fn to_seconds(ns: i64) -> f64 {
+    ns as f64 / SECOND_NS as f64
 }

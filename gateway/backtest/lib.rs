@@ -107,8 +107,3 @@ pub fn run_backtest(plan: BacktestPlan) -> Result<BacktestReport, HistoryError> 
         took: began.elapsed(),
     })
 }
-
-#[expect(clippy::cast_precision_loss, reason = "2^53 ns are a hundred days; beyond that microseconds suffice")]
-fn to_seconds(ns: i64) -> f64 {
-    ns as f64 / SECOND_NS as f64
-}

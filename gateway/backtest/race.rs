@@ -6,7 +6,7 @@
 //! not grow with the stretch.
 
 use super::lane::{self, Lane};
-use super::to_seconds;
+use crate::lane::to_seconds;
 use adapter_core::Sample;
 use adapter_core::clock::TimeNs;
 use gateway_history::HistoryError;

@@ -3,7 +3,7 @@
 use super::compare::{Evidence, Spell, SpellDifference};
 use super::history_alarms::Recorded;
 use super::lane::{Lane, RequestTotals};
-use super::to_seconds;
+use crate::lane::to_seconds;
 use gateway_base::moment::format_utc;
 use rules::script::ScriptProblem;
 use serde_json::{Value, json};

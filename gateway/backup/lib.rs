@@ -29,6 +29,7 @@ use gateway_base::moment;
 use gateway_history::{HistoryError, Reader};
 use list::{Fate, LIST, of_name};
 use origin::ORIGIN;
+use rules::estimators::wear::WearRecord;
 use std::path::{Path, PathBuf};
 
 /// The longest file that goes into a backup.
@@ -174,7 +175,7 @@ fn wear_models(history: &Path) -> Result<Vec<ArchivedFile>, HistoryError> {
     if !history.exists() {
         return Ok(Vec::new());
     }
-    let models = Reader::open(history)?.wear_models()?;
+    let models = Reader::open(history)?.wear_models::<WearRecord>()?;
     models
         .iter()
         .filter(|model| model.in_force)

@@ -318,7 +318,7 @@ fn check_origin(places: &BackupPaths, files: &[ArchivedFile]) -> Result<(), Rest
 fn find_new_models<'a>(history: &Path, wanted: &'a [WearRecord]) -> Result<Vec<&'a WearRecord>, RestoreError> {
     let there = match wanted.is_empty() || !history.exists() {
         true => Vec::new(),
-        false => Reader::open(history).and_then(|reader| reader.wear_models())?,
+        false => Reader::open(history).and_then(|reader| reader.wear_models::<WearRecord>())?,
     };
     Ok(wanted.iter().filter(|record| !there.iter().any(|it| it.in_force && it.record == **record)).collect())
 }

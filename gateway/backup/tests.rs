@@ -105,6 +105,8 @@ fn an_empty_box_gets_everything_that_decides() {
     };
     assert_eq!(without_author(taken(&new)), without_author(first.clone()));
     restore_backup(&new, &first, ask("x-before-restore-2.tar.gz")).expect("again");
-    let models = Reader::open(&new.history).and_then(|it| it.wear_models()).expect("there");
+    let models = Reader::open(&new.history)
+        .and_then(|it| it.wear_models::<rules::estimators::wear::WearRecord>())
+        .expect("there");
     assert_eq!(models.len(), 1, "a model that is in force is not stored twice");
 }

@@ -3,13 +3,12 @@
 pub mod cannot_run;
 pub mod clock;
 pub mod convert;
-pub mod files;
 pub mod limits;
 pub mod log;
 pub mod machine_path;
 pub mod moment;
-pub mod owner;
 pub mod problem;
-pub mod row_rate;
 pub mod state_file;
 pub mod usage;
+
+pub use gateway_files::{files, owner};

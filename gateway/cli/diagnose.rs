@@ -3,7 +3,8 @@
 use super::lang::{language, localize_text, pick_text};
 use super::{CannotRun, CommandOutcome, CommandResult};
 use crate::diagnosis::context::DiagnosisContext;
-use crate::diagnosis::series::{AlignBy, SimulatedSeries, attach_series, recorded_output, series_model};
+use crate::diagnosis::series::{SimulatedSeries, attach_series, recorded_output, series_model};
+use crate::diagnosis::series_alignment::AlignBy;
 use crate::diagnosis::{
     Copies, DiagnosisOutputs, InputRecordings, read_hypotheses, read_model, read_recordings_as, stretch,
 };

@@ -17,6 +17,7 @@ mod doctor_words;
 mod effects;
 #[cfg(feature = "fleet")]
 mod fleet;
+#[cfg(feature = "fleet")]
 mod fleet_resend;
 mod gateway_options;
 mod help;

@@ -1,6 +1,6 @@
 //! The keys of `[[source.channel]]`: the user's own channels.
 
-use super::keys::{Absent, ConfigKey, ValueKind};
+use super::config_key::{Absent, ConfigKey, ValueKind};
 use adapters::channel::quantity::LIMITS;
 
 /// The section, below a source.

@@ -1,8 +1,8 @@
 //! The keys of backups that are taken by themselves.
 
-use super::keys::Absent::{Default, Optional};
-use super::keys::ValueKind::{Flag, Number, Path};
-use super::keys::{ConfigKey, new_key};
+use super::config_key::Absent::{Default, Optional};
+use super::config_key::ValueKind::{Flag, Number, Path};
+use super::config_key::{ConfigKey, new_key};
 
 pub(super) const BACKUP: &[ConfigKey] = &[
     new_key(

@@ -1,8 +1,8 @@
 //! The rows of the table of keys that concern what may be written to the machine.
 
-use super::keys::Absent::{Default, Optional};
-use super::keys::ValueKind::{Flag, Number, OneOf, Text};
-use super::keys::{ConfigKey, new_key};
+use super::config_key::Absent::{Default, Optional};
+use super::config_key::ValueKind::{Flag, Number, OneOf, Text};
+use super::config_key::{ConfigKey, new_key};
 
 /// Keys of `[gate]` and `[gate.offset]`.
 pub(super) const GATE: &[ConfigKey] = &[

@@ -1,8 +1,8 @@
 //! The rows of the table of keys that concern what leaves the box.
 
-use super::keys::Absent::{Default, Optional, Required};
-use super::keys::ValueKind::{Flag, Name, Number, SinkAddress, Text};
-use super::keys::{ConfigKey, new_key};
+use super::config_key::Absent::{Default, Optional, Required};
+use super::config_key::ValueKind::{Flag, Name, Number, SinkAddress, Text};
+use super::config_key::{ConfigKey, new_key};
 
 /// Keys of `[[sink]]`, `[sinks]` and `[outbox]`.
 pub(super) const OUTPUTS: &[ConfigKey] = &[

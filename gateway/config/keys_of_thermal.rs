@@ -1,8 +1,8 @@
 //! The keys of the thermal law that the box runs.
 
-use super::keys::Absent::{Default, Optional};
-use super::keys::ValueKind::{Flag, Number, OneOf, Path};
-use super::keys::{ConfigKey, new_key};
+use super::config_key::Absent::{Default, Optional};
+use super::config_key::ValueKind::{Flag, Number, OneOf, Path};
+use super::config_key::{ConfigKey, new_key};
 
 pub(super) const THERMAL: &[ConfigKey] = &[
     new_key(

@@ -9,6 +9,7 @@ mod build;
 mod channel_keys;
 mod channels;
 mod check_value;
+mod config_key;
 mod in_force;
 mod key_list;
 pub mod keys;

@@ -171,7 +171,7 @@ mod tests {
         for _start in 0..2 {
             write_models(directory.path(), &history).expect("furnished");
         }
-        let library = Reader::open(&history).and_then(|reader| reader.wear_models()).expect("readable");
+        let library = Reader::open(&history).and_then(|reader| reader.wear_models::<WearRecord>()).expect("readable");
         assert_eq!(library.len(), 1, "stored once");
         let recipe = rules::operations::parse("demo-operations.toml", RECIPE).expect("a recipe");
         let materials: Vec<_> = recipe.operations().iter().filter_map(|it| it.work_material.as_deref()).collect();

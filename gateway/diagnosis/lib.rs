@@ -22,7 +22,7 @@ pub mod preview;
 mod recordings;
 pub mod report;
 pub mod series;
-mod series_alignment;
+pub mod series_alignment;
 pub mod simulation;
 pub mod status;
 pub mod steps;

@@ -4,6 +4,7 @@
 
 use super::recordings::describe_reading;
 use super::series_alignment::align_series;
+use crate::series_alignment::AlignBy;
 use adapter_core::bilingual::Bilingual;
 use adapter_core::channel::quantity::{Quantity, unit_of};
 use adapter_core::channel::unit::Unit;
@@ -12,22 +13,6 @@ use recording::{Cells, Mapping, Numbers, read_path, read_path_as};
 use rules::twin::text_report::format_short_number;
 use rules::twin::{Model, format_toml_text, parse_model};
 use std::path::Path;
-
-/// How a series is laid beside a recording.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
-pub enum AlignBy {
-    /// Clock time where both know the day, else the same row where both have the same times, else the course.
-    #[default]
-    Auto,
-    /// Times as they stand.
-    Time,
-    /// The lag at which both courses agree best.
-    Course,
-    /// The position of the axis.
-    Position,
-    /// The block of the NC program.
-    Block,
-}
 
 /// A series that is asked for: `FILE` or `FILE:COLUMN`.
 #[derive(Debug, Clone, PartialEq)]

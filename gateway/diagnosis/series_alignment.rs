@@ -1,6 +1,5 @@
 //! Where a simulated series lies beside a recording: by time, by its course, by position, by program block.
 
-use super::series::AlignBy;
 use adapter_core::bilingual::Bilingual;
 use adapter_core::channel::quantity::{Quantity, without_unit};
 use recording::Numbers;
@@ -156,4 +155,20 @@ fn interpolate_at(times: &[f64], numbers: &Numbers, at: f64) -> Option<f64> {
     let (from, to) = (times[before], *times.get(after)?);
     let (low, high) = (numbers.get(before)?, numbers.get(after)?);
     Some(if to > from { low + (high - low) * (at - from) / (to - from) } else { low })
+}
+
+/// How a series is laid beside a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub enum AlignBy {
+    /// Clock time where both know the day, else the same row where both have the same times, else the course.
+    #[default]
+    Auto,
+    /// Times as they stand.
+    Time,
+    /// The lag at which both courses agree best.
+    Course,
+    /// The position of the axis.
+    Position,
+    /// The block of the NC program.
+    Block,
 }

@@ -2,7 +2,7 @@
 
 use super::schema;
 use super::tls_connection::{self, Securing};
-use adapters::tls::{TlsError, TlsFiles};
+use device_line::tls::{TlsError, TlsFiles};
 use gateway_base::log::{Notice, Severity};
 use gateway_nats::NatsError;
 use std::path::PathBuf;

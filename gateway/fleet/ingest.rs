@@ -5,7 +5,8 @@
 
 use super::database::DatabaseSettings;
 use super::row::{FleetRow, RefusedMessage};
-use super::write::{Arrived, BatchResult, Database, RefusalRecord};
+use super::write::{BatchResult, Database, RefusalRecord};
+use crate::row::Arrived;
 use gateway_base::log::{Notice, Severity};
 use gateway_nats::{Connection, FetchLimits, Message, NatsError, NatsTarget, StreamSettings};
 use std::time::{Duration, Instant};

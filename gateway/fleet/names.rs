@@ -2,7 +2,7 @@
 
 use super::database::DatabaseError;
 use super::row::SeriesName;
-use super::write::Arrived;
+use crate::row::Arrived;
 use gateway_base::machine_path::MachinePath;
 use std::collections::HashMap;
 use tokio_postgres::Client;

@@ -273,6 +273,14 @@ impl<'a> FleetRow<'a> {
     }
 }
 
+/// A row, and when the stream had it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Arrived<'a> {
+    pub(super) row: &'a FleetRow<'a>,
+    /// When the stream had the row, microseconds since 1970.
+    pub(super) arrived_us: i64,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

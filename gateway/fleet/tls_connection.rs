@@ -3,7 +3,7 @@
 //! `sslmode=require` in the address, or one of the files `ca=`, `cert=` and `key=`, asks for it. Unlike the words of libpq, `require`
 //! here means what `verify-full` means there: who signed the certificate is checked, and that it belongs to this host.
 
-use adapters::tls::TlsFiles;
+use device_line::tls::TlsFiles;
 use std::future::Future;
 use std::io;
 use std::pin::Pin;

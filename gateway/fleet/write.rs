@@ -9,6 +9,7 @@ use super::names::Names;
 use super::redate::{self, KnownMoves, MovesOfBatch};
 use super::row::FleetRow;
 use super::schema::{self, Partition, Partitioning};
+use crate::row::Arrived;
 use gateway_nats::NatsError;
 use std::collections::BTreeSet;
 use tokio_postgres::error::SqlState;
@@ -38,14 +39,6 @@ pub(super) struct RefusalRecord {
     pub(super) subject: String,
     pub(super) reason: String,
     pub(super) payload: String,
-}
-
-/// A row, and when the stream had it.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Arrived<'a> {
-    pub(super) row: &'a FleetRow<'a>,
-    /// When the stream had the row, microseconds since 1970.
-    pub(super) arrived_us: i64,
 }
 
 /// A connection whose tables are there.

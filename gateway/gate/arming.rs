@@ -2,7 +2,7 @@
 
 use crate::limits::GateMode;
 use adapter_core::clock::{SECOND_NS, TimeNs};
-use gateway_base::convert::saturate_to_ns;
+use adapter_core::integer::saturate_to_ns;
 use std::fmt;
 use std::time::Duration;
 use thiserror::Error;

@@ -7,9 +7,9 @@
 //! held back by the latch of another passes when that has been seen to, if a script still asks for it.
 
 use super::hold::EXECUTION;
+use adapter_core::request::{Stop, StopRequest};
 use adapter_core::words::execution;
 use adapter_core::{LadderRequest, Sample};
-use rules::script::{Stop, StopRequest};
 use std::sync::Arc;
 
 /// A request of a script.

@@ -8,10 +8,10 @@ use super::verdict::{GateOutcome, Verdict};
 use super::write::{Occasion, Reaction, WriteRecord};
 use crate::limits::{GateConfig, GateMode, OffsetConfig};
 use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::request::OverrideRequest;
 use adapter_core::units::OverridePct;
-pub use gateway_base::row_rate::RowRate;
-use gateway_history::{Audit, Command, ReactionTime};
-use rules::script::OverrideRequest;
+pub use gateway_records::RowRate;
+use gateway_records::{Audit, Command, ReactionTime};
 use std::collections::VecDeque;
 
 /// A script's words in the audit are cut at so many characters.

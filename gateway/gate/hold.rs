@@ -1,9 +1,9 @@
 //! The reasons that hold 100 %, whatever a script asks for.
 
 use super::thread_cycle::ThreadCycle;
+use adapter_core::state::State;
 use adapter_core::words::{execution, mode, of_channel, operation};
 use adapter_core::{Absence, ChannelId, Sample};
-use rules::estimators::{Estimates, State};
 use std::fmt;
 
 /// Why 100 % is held.
@@ -144,14 +144,14 @@ impl Interlocks {
     }
 
     /// The first reason, or none. Called at every tick: it also follows the NC blocks.
-    pub(super) fn find_hold(&mut self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
+    pub(super) fn find_hold(&mut self, sample: &Sample, state: State) -> Option<Hold> {
         if let Some(block) = sample.text(BLOCK) {
             self.cycle.follow_block(block);
         }
         self.find_thread_hold(sample)
             .or_else(|| self.find_data_hold(sample))
             .or_else(|| self.find_controller_hold(sample))
-            .or_else(|| self.find_motion_hold(sample, estimates))
+            .or_else(|| self.find_motion_hold(sample, state))
     }
 
     /// Threads come first: there a change of the feed spoils the part even when everything else is well.
@@ -196,7 +196,7 @@ impl Interlocks {
     }
 
     /// What stands in the way of moving an offset; nothing between two programs. Call it after [`Interlocks::find_hold`].
-    pub(super) fn between_programs(&self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
+    pub(super) fn between_programs(&self, sample: &Sample, state: State) -> Option<Hold> {
         let needed = [MODE, EXECUTION, ALARM];
         let missing = needed.into_iter().find_map(|id| self.find_absence(sample, id).map(|why| (id, why)));
         if let Some((id, why)) = missing {
@@ -204,7 +204,7 @@ impl Interlocks {
         }
         let rests = [execution::READY, execution::PROGRAM_COMPLETED];
         self.find_mode_hold(sample).or_else(|| match sample.text(EXECUTION).unwrap_or_default() {
-            _ if estimates.state == State::Unknown => Some(Hold::StateUnknown),
+            _ if state == State::Unknown => Some(Hold::StateUnknown),
             word if rests.contains(&word) => None,
             execution::FEED_HOLD => Some(Hold::FeedHold),
             word if execution::ALL.contains(&word) => Some(Hold::Running),
@@ -243,9 +243,9 @@ impl Interlocks {
         }
     }
 
-    fn find_motion_hold(&self, sample: &Sample, estimates: &Estimates) -> Option<Hold> {
+    fn find_motion_hold(&self, sample: &Sample, state: State) -> Option<Hold> {
         let rapid = sample.number(RAPID).is_ok_and(|flag| flag > 0.0);
-        match estimates.state {
+        match state {
             State::Unknown => Some(Hold::StateUnknown),
             State::Rapid => Some(Hold::Rapid),
             _ if rapid => Some(Hold::Rapid),

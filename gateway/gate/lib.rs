@@ -44,17 +44,17 @@ pub use verdict::{GateOutcome, Verdict};
 pub use write::{AuditPath, Occasion, OverrideWriter, Reaction, WriteRecord};
 
 use crate::limits::{GateConfig, GateMode};
-use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::clock::TimeNs;
+use adapter_core::integer::saturate_to_ns;
+use adapter_core::request::{OffsetProposal, OverrideRequest};
+use adapter_core::state::State;
 use adapter_core::units::OverridePct;
 use adapter_core::{ChannelId, Sample};
 use arming::Arming;
 use ask::Asks;
-use gateway_base::convert::saturate_to_ns;
 use hold::Interlocks;
 use limit::{Aim, Slew};
 use offset::Circumstances;
-use rules::estimators::Estimates;
-use rules::script::{OffsetProposal, OverrideRequest};
 use std::time::Duration;
 
 /// Decides about feed overrides. One per machine; remembers the last decision, for the slew limit, and the arming.
@@ -130,17 +130,12 @@ impl Gate {
     }
 
     /// Decides about this tick's request; without one, the programmed feed is what is wanted.
-    pub fn decide_override(
-        &mut self,
-        request: Option<&OverrideRequest>,
-        sample: &Sample,
-        estimates: &Estimates,
-    ) -> Verdict {
+    pub fn decide_override(&mut self, request: Option<&OverrideRequest>, sample: &Sample, state: State) -> Verdict {
         let at_ns = sample.at_ns;
         self.arming.end_if_expired(at_ns);
         let hold = match self.limits.mode {
             GateMode::Off => Some(Hold::Off),
-            GateMode::Shadow | GateMode::Armed => self.interlocks.find_hold(sample, estimates),
+            GateMode::Shadow | GateMode::Armed => self.interlocks.find_hold(sample, state),
         };
         self.arming.end_if_silent(matches!(hold, Some(Hold::Missing(..))), at_ns);
         let armed = self.writes_override() && !std::mem::take(&mut self.ended);
@@ -214,18 +209,13 @@ impl Gate {
     }
 
     /// Judges the offsets that are proposed at this tick, after [`Gate::decide_override`]. Nothing while `[gate.offset]` is off.
-    pub fn judge_offsets(
-        &mut self,
-        proposals: &[OffsetProposal],
-        sample: &Sample,
-        estimates: &Estimates,
-    ) -> Vec<OffsetVerdict> {
+    pub fn judge_offsets(&mut self, proposals: &[OffsetProposal], sample: &Sample, state: State) -> Vec<OffsetVerdict> {
         if !self.offsets.is_concerned(proposals) {
             return Vec::new();
         }
         let now = Circumstances {
             at_ns: sample.at_ns,
-            hold: self.interlocks.between_programs(sample, estimates),
+            hold: self.interlocks.between_programs(sample, state),
             armed: self.writes_offsets(),
         };
         self.offsets.decide_offsets(proposals, now)
@@ -233,8 +223,8 @@ impl Gate {
 
     /// What is to be looked at in the control, because nobody knows for sure what is in force there. Call it after
     /// [`Gate::decide_override`].
-    pub fn collect_look_orders(&mut self, sample: &Sample, estimates: &Estimates) -> Vec<offset::OffsetOrder> {
-        let may = self.offsets.is_unsettled() && self.interlocks.between_programs(sample, estimates).is_none();
+    pub fn collect_look_orders(&mut self, sample: &Sample, state: State) -> Vec<offset::OffsetOrder> {
+        let may = self.offsets.is_unsettled() && self.interlocks.between_programs(sample, state).is_none();
         if may { self.offsets.collect_look_orders(sample.at_ns) } else { Vec::new() }
     }
 
@@ -281,6 +271,3 @@ impl Gate {
 }
 
 const DIAL: ChannelId = ChannelId::find_constant("feed_override_dial_pct");
-
-/// The longest time between two decisions over which the slew limit still counts; after more, it begins at 100 %.
-const PAUSE_NS: i64 = SECOND_NS;

@@ -1,8 +1,10 @@
 //! The band and the slew limit: no script can widen them.
 
-use super::PAUSE_NS;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use adapter_core::units::OverridePct;
+
+/// The longest time between two decisions over which the slew limit still counts; after more, it begins at 100 %.
+const PAUSE_NS: i64 = SECOND_NS;
 
 /// Why less, or something else, is let through than was asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,6 +61,7 @@ impl Aim {
             self.pct = target_pct;
         }
         self.pct = self.pct.min(ceiling_pct);
+        debug_assert!(self.pct <= ceiling_pct, "what is aimed at is never above the ceiling");
         self.pct
     }
 
@@ -78,6 +81,7 @@ pub(super) struct Slew {
 
 impl Slew {
     pub(super) fn new(up_pct_per_s: f64, down_pct_per_s: f64) -> Self {
+        assert!(up_pct_per_s >= 0.0 && down_pct_per_s >= 0.0, "a pace has no sign: {up_pct_per_s}, {down_pct_per_s}");
         Self { up_pct_per_s, down_pct_per_s, exact_pct: 100.0, at_ns: None }
     }
 
@@ -94,7 +98,13 @@ impl Slew {
         }
         let elapsed_s = elapsed_ns as f64 / SECOND_NS as f64;
         let (down, up) = (self.down_pct_per_s * elapsed_s, self.up_pct_per_s * elapsed_s);
+        debug_assert!(elapsed_s >= 0.0 && elapsed_ns <= PAUSE_NS, "a ramp knows how long its step took: {elapsed_s} s");
+        let before_pct = self.exact_pct;
         self.exact_pct += (target_pct - self.exact_pct).clamp(-down, up);
+        debug_assert!(
+            self.exact_pct - before_pct <= up + 1e-9 && before_pct - self.exact_pct <= down + 1e-9,
+            "no step is wider than the slew"
+        );
         self.at_ns = Some(at_ns);
         round_to_whole(self.exact_pct)
     }

@@ -8,8 +8,8 @@
 
 use super::error::{Doing, HistoryError};
 use super::reader::Reader;
-use super::record::Audit;
 use adapter_core::clock::TimeNs;
+use gateway_records::Audit;
 use rusqlite::{Connection, OptionalExtension, Row, params};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -118,6 +118,8 @@ pub(crate) fn append_row(db: &Connection, audit: &Audit) -> Result<(), rusqlite:
     let (last, previous) = read_head(db)?;
     let (number, audit) = (last + 1, audit.to_storable());
     let hash = hash(&previous, number, &audit);
+    assert!(number > 0, "rows of the audit are numbered from 1: {number}");
+    debug_assert!(previous.len() == BEGINNING.len() && hash.len() == BEGINNING.len(), "SHA-256 in hexadecimal");
     db.prepare_cached(
         "INSERT INTO audit (number, at_ns, kind, outcome, before, asked, after, unit, reason, script, script_version, person,
          previous, hash) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14)",

@@ -7,12 +7,12 @@
 use super::damage::{Aside, set_aside};
 use super::error::{HistoryError, add_path};
 use super::lock::append_suffix;
-use super::record::Event;
 use super::schema::{SCHEMA, copy_whole};
 use super::space::disk_room;
 use adapter_core::clock::TimeNs;
 use gateway_base::convert::clamp_to_unsigned;
 use gateway_base::{clock, files};
+use gateway_records::Event;
 use rusqlite::Connection;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -67,7 +67,6 @@ mod pyramid;
 mod query;
 mod reader;
 mod reason;
-mod record;
 mod record_sql;
 mod recover;
 mod redate;
@@ -96,8 +95,11 @@ pub use damage::{Aside, DamagedRows, damaged_files, set_aside};
 pub use earlier::{COPYING, go_back, is_going_back, remove_old_copies};
 pub use error::HistoryError;
 pub use export::{DayWritten, Format, day_of, plain_cell};
-pub use fact::{Fact, FactKind};
 pub use future::FutureRows;
+pub use gateway_records::{
+    Alarm, AlarmClear, Audit, Command, Decision, Diagnosis, Event, Fact, FactKind, Model, Part, ReactionTime, Record,
+    StateChange,
+};
 pub use info::{Dropped, Info, TableRows};
 pub use list::{AlarmEntry, RecordSpan, StateHour, StateInterval};
 pub use options::{DAY_NS, ExtraSeries, ExtraValue, Fidelity, Options, Retention, SeriesKind, WhenFull};
@@ -110,9 +112,6 @@ pub use overview::{Buckets, Overview};
 pub use query::{Chunk, Query, STATE_SERIES};
 pub use reader::Reader;
 pub use reason::Reasons;
-pub use record::{
-    Alarm, AlarmClear, Audit, Command, Decision, Diagnosis, Event, Model, Part, ReactionTime, Record, StateChange,
-};
 pub use redate::{Redated, set_clock};
 pub use repair::{Repaired, RepairedTable, repair_history};
 pub use rounding::round_to_decimals;

@@ -2,8 +2,8 @@
 
 use super::error::{Doing, HistoryError};
 use super::reader::Reader;
-use super::record::{Command, Decision, Diagnosis, Event, Model, Part};
 use adapter_core::clock::TimeNs;
+use gateway_records::{Command, Decision, Diagnosis, Event, Model, Part};
 use rusqlite::{Params, Row, params};
 use serde::Serialize;
 

@@ -2,11 +2,11 @@
 
 use super::options::{ExtraValue, Options, WhenFull};
 use super::reason::Reasons;
-use super::record::Record;
 use super::rows::SeriesRows;
 use super::series::Series;
 use adapter_core::Sample;
 use adapter_core::clock::TimeNs;
+use gateway_records::Record;
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};

@@ -5,11 +5,11 @@ use super::error::HistoryError;
 use super::mailbox::QueuedRecord;
 use super::pyramid::MINUTE_NS;
 use super::reason::Reasons;
-use super::record::{Event, Record};
 use super::rows::SeriesRows;
 use super::series::Series;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_base::convert::clamp_to_unsigned;
+use gateway_records::{Event, Record};
 use std::collections::VecDeque;
 
 /// A block is sealed at this many rows even within its minute: bounds memory at 100 Hz and beyond.
@@ -144,6 +144,7 @@ impl MinuteBuffer {
             {
                 to += 1;
             }
+            debug_assert!(to > from && self.open.len() + (to - from) <= BLOCK_ROWS_MAX, "rows find room in the block");
             self.open.append_rows(batch, from..to);
             self.next_row += (to - from) as i64;
             self.last_ns = Some(batch.at_ns[to - 1]);

@@ -9,7 +9,7 @@ use super::series::Series;
 use super::walk::{SegmentStretch, Walk};
 use adapter_core::channel::find_nearest_name;
 use adapter_core::clock::TimeNs;
-use rules::estimators::wear::tool_of;
+use adapter_core::tool_name::tool_of;
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 

@@ -1,10 +1,10 @@
 //! Records into their tables.
 
-use super::record::{
-    Alarm, AlarmClear, Command, Decision, Diagnosis, Event, Model, Part, ReactionTime, Record, StateChange,
-};
 use super::{audit, fact};
 use adapter_core::clock::{SECOND_NS, TimeNs};
+use gateway_records::{
+    Alarm, AlarmClear, Command, Decision, Diagnosis, Event, Model, Part, ReactionTime, Record, StateChange,
+};
 use rusqlite::{Connection, OptionalExtension, Params, params};
 use std::ops::Range;
 

@@ -6,11 +6,11 @@ use super::damage::DamagedRows;
 use super::error::{Doing, HistoryError};
 use super::minute_buffer::End;
 use super::reason::Reasons;
-use super::record::{Event, Record};
 use super::record_sql::{close_state, store_record};
 use super::rows::SeriesRows;
 use super::{schema, tail};
 use adapter_core::clock::TimeNs;
+use gateway_records::{Event, Record};
 use rusqlite::{Connection, OptionalExtension};
 
 /// Brings the file into order and says where it ends. If the last rows came from `goes_on`, the state they ended in is

@@ -4,13 +4,13 @@ use super::error::{Doing, HistoryError};
 use super::reader::Reader;
 use super::schema;
 use adapter_core::clock::TimeNs;
-use rules::estimators::wear::{WearKey, WearModel, WearRecord};
+use adapter_core::model_library::{LibraryModel, LibraryRow, WearKey};
 use rusqlite::{Connection, OptionalExtension, params};
 use std::path::Path;
 
 /// A model of the library.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StoredWearModel {
+pub struct StoredWearModel<M> {
     /// Number in the library.
     pub id: i64,
     /// When it was stored.
@@ -18,7 +18,7 @@ pub struct StoredWearModel {
     /// Is it the newest of its key?
     pub in_force: bool,
     /// The model and what it is for.
-    pub record: WearRecord,
+    pub record: M,
 }
 
 /// Stores a model; the ones before stay, the newest of a key is in force. A gateway may be writing the same history. Gives the
@@ -26,7 +26,7 @@ pub struct StoredWearModel {
 ///
 /// # Errors
 /// The file cannot be opened or written, or the model has a number that cannot be stored.
-pub fn store_wear_model(path: &Path, at_ns: TimeNs, record: &WearRecord) -> Result<i64, HistoryError> {
+pub fn store_wear_model(path: &Path, at_ns: TimeNs, record: &impl LibraryModel) -> Result<i64, HistoryError> {
     insert_wear_model(&schema::open_for_writing(path)?, at_ns, record)
 }
 
@@ -34,21 +34,22 @@ pub fn store_wear_model(path: &Path, at_ns: TimeNs, record: &WearRecord) -> Resu
 ///
 /// # Errors
 /// The same.
-pub fn store_wear_models(path: &Path, at_ns: TimeNs, records: &[&WearRecord]) -> Result<(), HistoryError> {
+pub fn store_wear_models(path: &Path, at_ns: TimeNs, records: &[&impl LibraryModel]) -> Result<(), HistoryError> {
     let mut db = schema::open_for_writing(path)?;
     let all = db.transaction().with_activity("storing wear models")?;
     for record in records {
-        insert_wear_model(&all, at_ns, record)?;
+        insert_wear_model(&all, at_ns, *record)?;
     }
     all.commit().with_activity("storing wear models")
 }
 
-fn insert_wear_model(db: &Connection, at_ns: TimeNs, record: &WearRecord) -> Result<i64, HistoryError> {
-    let toml = record.to_toml().map_err(HistoryError::Question)?;
-    let cuts = i64::try_from(record.cuts)
+fn insert_wear_model(db: &Connection, at_ns: TimeNs, record: &impl LibraryModel) -> Result<i64, HistoryError> {
+    let LibraryRow { key, form, criterion_mm, cuts, residual_sd_w, r2, origin, toml } =
+        record.to_row().map_err(|error| HistoryError::Question(error.to_string()))?;
+    let cuts = i64::try_from(cuts)
         .map_err(|error| rusqlite::Error::ToSqlConversionFailure(Box::new(error)))
         .with_activity("storing a wear model")?;
-    let WearKey { machine, tool, work_material, operation } = &record.key;
+    let WearKey { machine, tool, work_material, operation } = key;
     db.execute(
         "INSERT INTO wear_models (at_ns, machine, tool, work_material, operation, form, criterion_mm, cuts, residual_sd_w, r2,
          origin, toml) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
@@ -58,24 +59,17 @@ fn insert_wear_model(db: &Connection, at_ns: TimeNs, record: &WearRecord) -> Res
             tool,
             work_material,
             operation,
-            record.model.form(),
-            record.criterion_mm,
+            form,
+            criterion_mm,
             cuts,
-            residual_sd_w(&record.model),
-            record.r2,
-            record.origin,
+            residual_sd_w,
+            r2,
+            origin,
             toml
         ],
     )
     .with_activity("storing a wear model")?;
     Ok(db.last_insert_rowid())
-}
-
-fn residual_sd_w(model: &WearModel) -> f64 {
-    match model {
-        WearModel::Surface(surface) => surface.residual_sd_w,
-        WearModel::Physical(physical) => physical.residual_sd_w,
-    }
 }
 
 /// Does the file have the table? One of an older version that nobody has written since does not.
@@ -104,7 +98,7 @@ impl Reader {
     ///
     /// # Errors
     /// What `SQLite` says, or a model that was spoilt.
-    pub fn wear_models(&self) -> Result<Vec<StoredWearModel>, HistoryError> {
+    pub fn wear_models<M: LibraryModel>(&self) -> Result<Vec<StoredWearModel<M>>, HistoryError> {
         if !has_library(&self.db)? {
             return Ok(Vec::new());
         }
@@ -118,8 +112,8 @@ impl Reader {
         let rows: Vec<_> = rows.and_then(Iterator::collect).with_activity("reading the wear models")?;
         rows.into_iter()
             .map(|(id, at_ns, in_force, toml)| {
-                let spoilt = |what| HistoryError::Question(format!("wear model {id} of the library: {what}"));
-                Ok(StoredWearModel { id, at_ns, in_force, record: WearRecord::parse(&toml).map_err(spoilt)? })
+                let spoilt = |what: M::Error| HistoryError::Question(format!("wear model {id} of the library: {what}"));
+                Ok(StoredWearModel { id, at_ns, in_force, record: M::from_toml(&toml).map_err(spoilt)? })
             })
             .collect()
     }

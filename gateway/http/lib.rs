@@ -69,11 +69,11 @@ use gateway_access::Access;
 use gateway_control::OrderSender;
 use gateway_diagnosis::files::FileDiagnoses;
 use gateway_diagnosis::handle::DiagnosisHandle;
-use gateway_status::Status;
+use gateway_status::{Published, Status};
 use guard::{Guarded, guard_route};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use streams::Streams;
 use tokio::sync::{Semaphore, watch};
 use tower_http::catch_panic::CatchPanicLayer;
@@ -81,15 +81,6 @@ use tower_http::compression::CompressionLayer;
 
 /// A status older than this means that the tick stands still.
 const ALIVE_WITHIN: Duration = Duration::from_secs(5);
-
-/// The latest status and when it came.
-#[derive(Debug, Clone)]
-pub struct Published {
-    /// The document of `/api/v1/status`.
-    pub status: Arc<Status>,
-    /// When it was published, on the monotonic clock of this process.
-    pub at: Instant,
-}
 
 /// What the server is made from.
 #[derive(Debug)]

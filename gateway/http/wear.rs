@@ -8,6 +8,7 @@ use axum::extract::{Query as Pairs, State};
 use axum::routing::get;
 use gateway_history::StoredWearModel;
 use rules::estimators::wear::WearModel;
+use rules::estimators::wear::WearRecord;
 use serde_json::{Value, json};
 
 pub(super) const ROUTES: &[Route] = &[Route::read("/api/v1/wear", || get(serve_wear_models))];
@@ -23,7 +24,7 @@ async fn serve_wear_models(State(shared): State<ServerState>, Pairs(pairs): Hist
     .await
 }
 
-fn wear_model_to_json(stored: &StoredWearModel) -> Value {
+fn wear_model_to_json(stored: &StoredWearModel<WearRecord>) -> Value {
     let record = &stored.record;
     let (formula, residual_sd_w) = match &record.model {
         WearModel::Surface(surface) => (surface.format_formula(), surface.residual_sd_w),

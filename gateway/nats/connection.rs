@@ -66,7 +66,7 @@ impl Connection {
     async fn open_one(target: &NatsTarget, at: &Endpoint, name: &str) -> Result<Self, NatsError> {
         let secrets = target.read_secrets()?;
         let broken = |error: io::Error| words::of_io(at, &error);
-        let config = target.tls.as_ref().map(adapter_core::tls::TlsFiles::build_config).transpose();
+        let config = target.tls.as_ref().map(device_line::tls::TlsFiles::build_config).transpose();
         let config = config.map_err(|error| NatsError::new(error.what, error.next))?;
         let stream = TcpStream::connect((at.host.as_str(), at.port)).await.map_err(broken)?;
         stream.set_nodelay(true).map_err(broken)?;

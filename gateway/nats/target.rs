@@ -1,8 +1,8 @@
 //! The servers of an address: `//HOST:4222,HOST:4222/REST?keys`.
 
 use super::NatsError;
-use adapter_core::address::{AddressProblem, Endpoint, Keys, Login, parse_endpoint, tls_files};
-use adapter_core::tls::TlsFiles;
+use adapter_core::address::{AddressProblem, Endpoint, Keys, Login, parse_endpoint};
+use device_line::tls::TlsFiles;
 use std::path::PathBuf;
 
 /// The port that NATS servers listen on.
@@ -50,7 +50,7 @@ impl NatsTarget {
     /// # Errors
     /// A host is none, in words.
     pub fn parse<'a>(body: &'a str, keys: &mut Keys, secured: bool) -> Result<(Self, &'a str), ClusterAddressError> {
-        let tls = tls_files(keys, secured);
+        let tls = TlsFiles::from_keys(keys, secured);
         let login = Login::from_keys(keys);
         let token_file = keys.take_text("token_file").map(PathBuf::from);
         if token_file.is_some() && login.user.is_some() {

@@ -2,7 +2,7 @@
 
 use super::NatsError;
 use adapter_core::address::Endpoint;
-use adapter_core::tls::TlsError;
+use device_line::tls::TlsError;
 use std::io::{self, ErrorKind};
 
 /// The connection could not be made or broke.

@@ -170,7 +170,8 @@ impl Pipeline {
         if let Some(request) = self.request.take() {
             self.scripts.add_override_request(request);
         }
-        self.verdict = Some(self.gate.decide_override(self.scripts.decision().request.as_ref(), sample, &estimates));
+        self.verdict =
+            Some(self.gate.decide_override(self.scripts.decision().request.as_ref(), sample, estimates.state));
         if let Some(proposal) = self.proposal.take() {
             self.scripts.add_offset_proposal(proposal);
         }
@@ -237,13 +238,13 @@ impl Pipeline {
 
     /// What the gate makes of the offsets that were proposed at this tick; after [`Pipeline::decide_commands`].
     pub fn judge_offsets(&mut self, sample: &Sample) -> Vec<OffsetVerdict> {
-        self.gate.judge_offsets(&self.scripts.decision().offsets, sample, &self.estimates)
+        self.gate.judge_offsets(&self.scripts.decision().offsets, sample, self.estimates.state)
     }
 
     /// What is to be looked at in the control, because nobody knows for sure what is in force there; after
     /// [`Pipeline::decide_commands`].
     pub fn list_readbacks(&mut self, sample: &Sample) -> Vec<offset::OffsetOrder> {
-        self.gate.collect_look_orders(sample, &self.estimates)
+        self.gate.collect_look_orders(sample, self.estimates.state)
     }
 
     /// What the gate made of the last request.

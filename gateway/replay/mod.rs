@@ -22,6 +22,7 @@ use adapters::replay::{Replay, UNKNOWN_PAUSE_S};
 use adapters::{Pull, Sample};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use resume::{Before, origin_of};
+use rules::estimators::wear::WearRecord;
 use rules::estimators::{self, VisibilityTally};
 use rules::operations::{Completion, Recipe};
 use rules::script::Host;
@@ -124,7 +125,7 @@ pub fn replay_files(plan: &ReplayPlan, scripts: Host, gate: config::GateConfig) 
 fn load_wear_models(plan: &ReplayPlan, pipeline: &mut Pipeline) -> Result<(), CannotRun> {
     let Some(path) = plan.models.as_ref().or(plan.history.as_ref()).filter(|path| path.exists()) else { return Ok(()) };
     let cannot = |error: crate::history::HistoryError| CannotRun::new(error.to_string(), "");
-    let stored = Reader::open(path).and_then(|reader| reader.wear_models()).map_err(cannot)?;
+    let stored = Reader::open(path).and_then(|reader| reader.wear_models::<WearRecord>()).map_err(cannot)?;
     let records: Vec<_> =
         stored.into_iter().filter(|model| model.in_force).map(|model| Arc::new(model.record)).collect();
     let mut machines: Vec<&str> =

@@ -4,7 +4,7 @@ use super::outputs::ConfiguredSinks;
 use super::tick::RunFlags;
 use crate::signals::{SignalRequest, Signals};
 use gateway_base::log::{Notice, Severity};
-use gateway_http::Published;
+use gateway_status::Published;
 use std::sync::atomic::Ordering;
 use tokio::sync::watch;
 

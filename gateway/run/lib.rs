@@ -48,12 +48,12 @@ use gateway_control::{self as control, OrderReceiver};
 use gateway_diagnosis::handle::DiagnosisHandle;
 use gateway_gate::Gate;
 use gateway_http::{
-    Certificate, CertificateError, Configured, Published, Server, ServerParts, ServerState, bind_port, port_trouble,
+    Certificate, CertificateError, Configured, Server, ServerParts, ServerState, bind_port, port_trouble,
 };
 use gateway_pipeline::Pipeline;
 use gateway_sources::open::{self, MachineSpeed, Sources};
 use gateway_sources::origin_log::OriginLog;
-use gateway_status::alignment;
+use gateway_status::{Published, alignment};
 use health::Health;
 use history_store::HistoryStore;
 use live_twin::Twin;

@@ -2,8 +2,8 @@
 
 use super::SinkError;
 use super::address::TargetError;
-use adapter_core::address::{Endpoint, Keys, Login, parse_endpoint, tls_files};
-use adapter_core::tls::TlsFiles;
+use adapter_core::address::{Endpoint, Keys, Login, parse_endpoint};
+use device_line::tls::TlsFiles;
 use mqtt::{MqttClient, MqttError, MqttMessage, Options, Outgoing, Qos, Version, Will};
 use std::sync::Arc;
 use std::time::Duration;
@@ -36,7 +36,7 @@ impl BrokerTarget {
     /// # Errors
     /// The host is none, in words.
     pub(super) fn parse<'a>(body: &'a str, keys: &mut Keys, secured: bool) -> Result<(Self, &'a str), TargetError> {
-        let tls = tls_files(keys, secured);
+        let tls = TlsFiles::from_keys(keys, secured);
         let login = Login::from_keys(keys);
         let version = keys.take_choice("protocol", &[("3.1.1", Version::V3), ("5", Version::V5)]);
         let client_id = keys.take_text("client_id");

@@ -5,12 +5,12 @@
 //! the machine has followed or will not ([`RequestOutcome`]), which the sink fetches with [`Requests::wait_for_outcome`].
 
 use adapter_core::clock::{SECOND_NS, TimeNs};
-use gateway_base::row_rate::RowRate;
 use gateway_base::{clock, moment};
 use gateway_control::{
     FactSender, FactsTaken, NetworkRequest, OUTCOMES_MAX, OrderSender, OutcomeSender, Reply, RequestOrigin,
     RequestOutcome, RequestRefusal, RequestedChange, read_facts_json,
 };
+use gateway_records::RowRate;
 use serde_json::{Value as Json, json};
 use std::collections::VecDeque;
 use tokio::sync::mpsc::{Receiver, channel};

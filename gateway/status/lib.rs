@@ -5,12 +5,14 @@
 
 pub mod alignment;
 mod gate;
+mod latest_status;
 
 use adapter_core::histogram::Histogram;
 pub use gate::{AxisShift, GateStatus, OffsetStatus};
 pub use gateway_base::clock::ClockStatus;
 use gateway_base::machine_path::MachinePath;
 pub use gateway_base::problem::StatusProblem;
+pub use latest_status::Published;
 use serde::Serialize;
 
 /// A number or a word.

@@ -26,9 +26,9 @@ use super::estimate_words::NoLoadOrigin;
 use super::evidence::Evidence;
 use super::signals::{Feed, Pace, seconds_between};
 use super::situation::{SeenBefore, Situation, Tick};
-use super::state::State;
 use super::window::Means;
 use adapter_core::clock::TimeNs;
+use adapter_core::state::State;
 use serde::{Deserialize, Serialize};
 
 /// How long a start or speed change without a known no-load power may stay unsettled under feed before the state is

@@ -4,8 +4,8 @@ use super::basis::StateBasis;
 use super::estimate_words::{LoadLossOrigin, NoLoadOrigin, Visibility};
 use super::loads::{Figure, Loads};
 use super::part::PartFigures;
-use super::state::State;
 use adapter_core::clock::TimeNs;
+use adapter_core::state::State;
 use adapter_core::{Absence, ChannelId};
 use std::fmt;
 

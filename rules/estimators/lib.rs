@@ -52,13 +52,13 @@ mod signals;
 mod situation;
 pub mod spindle_current;
 mod stage_settings;
-mod state;
 mod supply;
 pub mod thermal;
 mod visibility;
 pub mod wear;
 mod window;
 
+pub use adapter_core::state::State;
 pub use basis::StateBasis;
 pub use evidence::Evidence;
 pub use window::{Means, PowerWindow, is_stationary};
@@ -68,14 +68,13 @@ pub use estimate::{Estimate, Estimated, Estimates, NoEstimate};
 pub use estimate_words::{LoadLossOrigin, NoLoadOrigin, Visibility};
 pub use filter::AntiPulse;
 pub use inference::{Inference, RestoreError};
-pub use interpolation::{
+pub use load_loss_doubt::LoadLossDoubt;
+pub use no_load::{NoLoad, NoLoadPoint, NoLoadTable};
+pub use numerics::speed_weights::{
     EXTRAPOLATION_GAIN_MAX, SimulatedSpeedWeights, SpeedWeights, Weights, form_sd, lagrange_weights, noise_gain,
     select_adjacent_speeds, weigh_known_speeds,
 };
-pub use load_loss_doubt::LoadLossDoubt;
-pub use no_load::{NoLoad, NoLoadPoint, NoLoadTable};
 pub use part::PartFigures;
 pub use script_number::format_script_number;
 pub use settings::{SETTINGS, SPEEDS_PER_STAGE, STAGES, Setting, SettingError, Settings};
-pub use state::State;
 pub use visibility::{VisibilityTally, VisibilityVerdict};

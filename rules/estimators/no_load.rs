@@ -8,10 +8,10 @@
 
 use super::estimate::NoEstimate;
 use super::estimate_words::NoLoadOrigin;
-use super::interpolation::{Weights, form_sd, noise_gain};
 use super::settings::{SPEEDS_PER_STAGE, STAGES, Settings};
 use super::signals::seconds_between;
 use adapter_core::clock::TimeNs;
+use numerics::speed_weights::{Weights, form_sd, noise_gain};
 use serde::{Deserialize, Serialize};
 
 /// Correlation of the drift of two speeds of one stage: bearings and oil warm up together.

@@ -91,6 +91,12 @@ pub fn normal_share(x: f64) -> f64 {
     0.5 * erfc(-x / std::f64::consts::SQRT_2)
 }
 
+/// Greatest magnitude; at least the smallest positive number, so that it can divide.
+#[must_use]
+pub fn find_greatest_magnitude(values: &[f64]) -> f64 {
+    values.iter().fold(f64::MIN_POSITIVE, |top, value| top.max(value.abs()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

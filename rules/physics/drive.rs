@@ -1,8 +1,8 @@
 //! Which drive an output belongs to, and how that drive moves, in SI units or thousands of revolutions.
 
-use super::excitation::find_greatest_magnitude;
 use super::{OutputKind, Role, Scene};
 use adapter_core::channel::quantity::{is_of_spindle, unit_of};
+use numerics::statistics::find_greatest_magnitude;
 use std::f64::consts::PI;
 
 /// Greatest moment of inertia of a spindle with its work: a blank of 20 t and 2 m on a vertical lathe has 10,000 kg m2.

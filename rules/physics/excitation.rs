@@ -1,12 +1,8 @@
 //! What a recording excites: levels, visits, boundaries and the grids of shapes worth trying in it.
 
 use super::{Effect, Form, Scene};
+use numerics::statistics::find_greatest_magnitude;
 use std::collections::BTreeSet;
-
-/// Greatest magnitude; at least the smallest positive number, so that it can divide.
-pub(crate) fn find_greatest_magnitude(values: &[f64]) -> f64 {
-    values.iter().fold(f64::MIN_POSITIVE, |top, value| top.max(value.abs()))
-}
 
 /// Do the values differ by more than a thousandth of the greatest?
 pub(crate) fn has_variation(values: &[f64]) -> bool {

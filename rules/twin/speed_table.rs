@@ -1,6 +1,6 @@
-//! No-load power as a table over speed: the law of the running machine (`estimators::weigh_known_speeds`).
+//! No-load power as a table over speed: the law of the running machine (`numerics::speed_weights`).
 
-use estimators::{SimulatedSpeedWeights, Weights, form_sd};
+use numerics::speed_weights::{SimulatedSpeedWeights, Weights, form_sd};
 use physics::{Role, Scene};
 
 /// Speeds of a no-load table; the powers are the part's parameters `power_w[0]`, `power_w[1]`, ...

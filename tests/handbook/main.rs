@@ -12,6 +12,7 @@ mod identifiers;
 mod pictures;
 mod run;
 mod settings;
+mod source_index;
 
 use documents::{documents, root};
 use gateway::handbook::{CHAPTERS, find_chapter, list_contents, nearest_topic};

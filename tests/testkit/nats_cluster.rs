@@ -39,6 +39,30 @@ fn program() -> Option<PathBuf> {
     found
 }
 
+/// First two numbers of a version, as in `nats-server: v2.15.1`.
+fn parse_version(said: &str) -> Option<(u32, u32)> {
+    let (_, version) = said.trim().rsplit_once('v')?;
+    let mut numbers = version.split('.').map(str::parse);
+    Some((numbers.next()?.ok()?, numbers.next()?.ok()?))
+}
+
+/// Is the server of this version or a newer one? Where it is older, says what a test needs of it; fails where every partner has to be
+/// there. Also `false` where the program is not installed.
+pub fn has_version(least: (u32, u32), because: &str) -> bool {
+    let Some(program) = program() else { return false };
+    let said = Command::new(&program).arg("--version").output().expect("it runs");
+    let said = String::from_utf8_lossy(&said.stdout).into_owned();
+    let version = parse_version(&said).unwrap_or_else(|| panic!("{} says {said:?}", program.display()));
+    let told =
+        format!("{} is {}; {}.{} or newer is needed: {because}", program.display(), said.trim(), least.0, least.1);
+    let is_new = version >= least;
+    assert!(is_new || std::env::var_os("CNC_GATEWAY_CI").is_none(), "{told}");
+    if !is_new {
+        eprintln!("SKIPPED: {told}");
+    }
+    is_new
+}
+
 impl Cluster {
     /// `count` servers with these further lines in the configuration; `None` where the program is not installed.
     pub fn with(count: usize, lines: &str) -> Option<Self> {

@@ -3,6 +3,8 @@
 
 #[path = "advisories.rs"]
 mod advisories;
+#[path = "arrows.rs"]
+mod arrows;
 #[path = "functions.rs"]
 mod functions;
 #[path = "habits.rs"]

@@ -1,19 +1,19 @@
 //! The notation of addresses, `SCHEME:BODY?KEYS`: what all schemes share. What one scheme means stands with its device.
 
-mod broker_keys;
 mod circuit;
 mod endpoint;
 mod keys;
+mod login;
 mod problem;
 mod secrets;
 mod serial_line;
 mod speed;
 mod waveform_keep;
 
-pub use broker_keys::{Login, tls_files};
 pub use circuit::{Circuit, parse_circuit, parse_timeout};
 pub use endpoint::{Endpoint, parse_endpoint, parse_library};
 pub use keys::{Keys, parse_encoding};
+pub use login::Login;
 pub use problem::AddressProblem;
 pub use secrets::{NO_SECRETS, mask_secrets};
 pub use serial_line::{Parity, SerialTarget, parse_serial};

@@ -1,5 +1,6 @@
 //! One question to one answer, in the encoding of the generation.
 
+use super::answer_form::{ATTRIB, Data8, FUNC, NUMBER, parse_stretch};
 use super::axes::{self, encode_places};
 use super::controller::{Controller, Data};
 use super::encode::{convert_to_i32, encode_longs, encode_shorts, encode_text};
@@ -7,18 +8,10 @@ use super::{message, program, tool, write};
 use adapter_core::integer::clamp_count;
 use fanuc::answer::System;
 use fanuc::generation::Generation;
-use fanuc::item::{Area, PmcWidth, Spindle, Stretch};
+use fanuc::item::Spindle;
 use fanuc::request::function as f;
 use fanuc::wire::{CncOrPmc, Number, ReplyBlock, Request, reply_body};
 
-/// What a question yields: data, or a return code.
-pub(super) type Data8 = Result<Vec<u8>, i16>;
-
-/// No such function, wrong length, wrong number, wrong type.
-pub(super) const FUNC: i16 = 1;
-pub(super) const LENGTH: i16 = 2;
-pub(super) const NUMBER: i16 = 3;
-pub(super) const ATTRIB: i16 = 4;
 const PATH: i16 = 11;
 
 /// Answers every question of a frame, in order.
@@ -187,14 +180,6 @@ fn encode_parameter(
     let older = || (0..places_of).flat_map(|place| value(place).map_or(0, |number| number.mantissa).to_be_bytes());
     let values = if newer { encode_places(controller, value) } else { older().collect() };
     Ok([head, values].concat())
-}
-
-/// The stretch of PMC memory that a question is about.
-pub(super) fn parse_stretch(request: &Request) -> Result<Stretch, i16> {
-    let [from, to, area, width, _] = request.arguments;
-    let at = |at: i32| u16::try_from(at).map_err(|_| NUMBER);
-    let (area, width) = (Area::of_number(area).ok_or(ATTRIB)?, PmcWidth::of_number(width).ok_or(ATTRIB)?);
-    Ok(Stretch { area, from: at(from)?, to: at(to)?, width })
 }
 
 fn read_memory(controller: &Controller, request: &Request) -> Data8 {

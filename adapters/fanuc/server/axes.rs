@@ -1,6 +1,6 @@
 //! Positions, names and units of the axes, and what spindles and drives show.
 
-use super::answer::{ATTRIB, Data8};
+use super::answer_form::{ATTRIB, Data8};
 use super::controller::{Controller, ControllerAxis};
 use super::encode::{encode_longs, encode_shorts};
 use adapter_core::integer::convert_bounded;

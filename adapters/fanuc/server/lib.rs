@@ -17,6 +17,7 @@
 //! | `second_path` | what its second turret shows |
 
 mod answer;
+mod answer_form;
 mod axes;
 mod controller;
 mod encode;
@@ -26,6 +27,7 @@ mod listen;
 mod machine;
 mod memory;
 mod message;
+mod panel_status;
 mod program;
 mod screen;
 mod second_path;

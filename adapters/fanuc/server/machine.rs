@@ -4,12 +4,13 @@ use super::controller::{Controller, Data};
 use super::encode::saturate_counter;
 use super::ladder::{PmcLadder, SCAN_NS};
 use super::listen::ServedControl;
+use super::panel_status::{build_status, round_to_number};
 use super::{screen, second_path};
 use adapter_core::clock::{Clock, TimeNs};
 use adapter_core::driver::{Actuator, LadderRequest, LadderRule};
 use adapter_core::units::OverridePct;
 use adapter_core::words::{execution, mode, operation};
-use fanuc::answer::{Alarm, Status};
+use fanuc::answer::Alarm;
 use fanuc::item::{Area, BlockWord};
 use fanuc::wire::Number;
 use simulated::address::SimulatedMachine;
@@ -178,29 +179,6 @@ fn show_moment(control: &mut Controller, moment: &Moment) {
     control.set_diagnosis(4902, 2, power);
     show_alarms(control, panel);
     show_signals(control, panel);
-}
-
-pub(super) fn round_to_number(value: f64) -> Number {
-    #[expect(clippy::cast_possible_truncation, reason = "saturates, which is what a display does")]
-    let mantissa = value.round() as i32;
-    Number::from_decimal(mantissa, 0)
-}
-
-pub(super) fn build_status(panel: &Panel) -> Status {
-    let automatic = match panel.mode {
-        mode::MANUAL_DATA_INPUT => 0,
-        mode::EDIT => 3,
-        mode::MANUAL => 5,
-        _ => 1,
-    };
-    let run = match panel.execution {
-        execution::ACTIVE | execution::INTERRUPTED => 3,
-        execution::FEED_HOLD => 2,
-        execution::STOPPED => 1,
-        _ => 0,
-    };
-    let motion = i16::from(panel.feed_mm_min > 0.0);
-    Status { automatic, run, motion, alarm: i16::from(!panel.alarm.is_empty()), ..Status::default() }
 }
 
 /// Positions in micrometres. The load of an axis is what its friction takes: 3 % and 1 % more per 200 mm/min.

@@ -1,6 +1,6 @@
 //! Alarms, those that have been, messages to the operator, and the clock.
 
-use super::answer::{Data8, NUMBER};
+use super::answer_form::{Data8, NUMBER};
 use super::controller::Controller;
 use super::encode::{convert_to_i32, encode_longs, encode_shorts, encode_text};
 use adapter_core::integer::clamp_count;

@@ -1,6 +1,6 @@
 //! Programs: what runs, what there is, and the modal state of the block.
 
-use super::answer::{ATTRIB, Data8, NUMBER};
+use super::answer_form::{ATTRIB, Data8, NUMBER};
 use super::controller::{Controller, ProgramFile};
 use super::encode::{convert_to_i32, encode_longs, encode_shorts, encode_text};
 use adapter_core::integer::clamp_count;

@@ -3,7 +3,7 @@
 
 use super::controller::{Controller, Data, ProgramFile, ToolGroup};
 use super::encode::saturate_counter;
-use super::machine::round_to_number;
+use super::panel_status::round_to_number;
 use adapter_core::clock::TimeNs;
 use adapter_core::words::execution;
 use fanuc::answer::{Alarm, OperatorMessage, PastAlarm, SpeedUnit};

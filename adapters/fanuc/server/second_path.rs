@@ -4,8 +4,8 @@
 
 use super::controller::Controller;
 use super::ladder::PmcLadder;
-use super::machine::{build_status, round_to_number};
 use super::memory::Memory;
+use super::panel_status::{build_status, round_to_number};
 use adapter_core::driver::LadderRequest;
 use fanuc::item::{Area, BlockWord};
 use fanuc::poll::find_signal_address;

@@ -1,6 +1,6 @@
 //! Tool offsets, work offsets and tool life.
 
-use super::answer::{ATTRIB, Data8, NUMBER};
+use super::answer_form::{ATTRIB, Data8, NUMBER};
 use super::controller::{Controller, ToolGroup};
 use super::encode::{encode_longs, encode_shorts};
 use fanuc::wire::Number;

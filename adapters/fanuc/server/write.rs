@@ -1,6 +1,6 @@
 //! What a question writes.
 
-use super::answer::{ATTRIB, FUNC, LENGTH, NUMBER, parse_stretch};
+use super::answer_form::{ATTRIB, FUNC, LENGTH, NUMBER, parse_stretch};
 use super::controller::Controller;
 use fanuc::item::Area;
 use fanuc::request::function as f;

@@ -9,8 +9,8 @@ use super::structure::{Bytes, POSITION_PLACES, check_code, fill_structure, scale
 use crate::answer::{Alarm, FocasAnswer, FocasItemError, FocasItemResult, Refusal, SpeedUnit, Status, System};
 use crate::code::FocasReturnCode;
 use crate::item::{BlockWord, FocasItem, PmcWidth, PositionFrame, Servo, Spindle, Stretch};
-use adapter_core::child::Guarded;
 use adapter_core::integer::{clamp_count, const_to_i16, convert_bounded};
+use device_line::child::Guarded;
 use std::mem::{offset_of, size_of};
 
 /// Most alarms, spindles and PMC bytes that are asked for at a time.

@@ -2,7 +2,7 @@
 //!
 //! The library aborts when its log cannot be written, hangs on a silent line, writes far beyond its structures when an
 //! answer is malformed, leaves garbage behind on errors, and binds its handle to a thread. So it is loaded only in a
-//! [child process](adapter_core::child) whose one thread owns the handle. All questions of a poll are one request to the child,
+//! [child process](device_line::child) whose one thread owns the handle. All questions of a poll are one request to the child,
 //! which answers each as soon as it has it: when it dies or hangs, the one it was at is told as failed, a fresh child goes
 //! on with the next one of the same poll, and a question that has killed the child twice is left alone until the next
 //! connection.

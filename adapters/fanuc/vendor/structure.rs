@@ -3,8 +3,8 @@
 use super::layout::LoadElm;
 use crate::answer::{FocasItemError, Refusal};
 use crate::code::FocasReturnCode;
-use adapter_core::child::{Guarded, Missing};
 use adapter_core::text::TextEncoding;
+use device_line::child::{Guarded, Missing};
 use std::mem::offset_of;
 
 /// Decimals of offsets that the library gives without them (increment system IS-B, millimetres).

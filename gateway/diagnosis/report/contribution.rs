@@ -2,8 +2,8 @@
 
 use super::axis::{Axis, time_unit};
 use super::data::{Data, Fit};
-use super::place::capitalise_first;
 use super::plot::{Curve, Plot, thin_curve};
+use super::text::capitalise_first;
 use super::text::escape_html;
 
 /// Runs above which their beginnings are no longer marked, and no longer named.

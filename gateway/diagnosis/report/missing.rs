@@ -1,8 +1,8 @@
 //! What is missing: each effect with its law, its parameters and how sure they are.
 
 use super::data::Data;
-use super::place::capitalise_first;
 use super::table::{ColumnHead, render_table};
+use super::text::{capitalise_first, format_percent};
 use super::text::{decimal_exponent, escape_html, format_fixed, format_law, format_number, unit_text, with_unit};
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::{Missing, ParameterEstimate};
@@ -176,16 +176,4 @@ fn render_absorption(data: &Data<'_>, missing: &Missing) -> String {
     };
     let bar = format!("<span class=\"share\"><i style=\"width:{:.1}%\"></i></span>", 100.0 * share);
     render_fact(data.pick_text("How hidden it was", "隐藏程度"), &(bar + text.as_str()))
-}
-
-/// A share in percent; what is less than a tenth of a percent from none or all is told so.
-pub(super) fn format_percent(x: f64) -> String {
-    let text = match x {
-        x if x <= 0.0 => "0".to_owned(),
-        x if x >= 100.0 => "100".to_owned(),
-        x if x <= 0.1 => "&lt;\u{202f}0.1".to_owned(),
-        x if x >= 99.9 => "&gt;\u{202f}99.9".to_owned(),
-        x => format_fixed(x, i32::from(!(1.0..=99.0).contains(&x))),
-    };
-    with_unit(&text, "%")
 }

@@ -47,7 +47,7 @@ pub(super) fn render_experiment(data: &Data<'_>) -> String {
     format!(
         "<section class=\"next\"><h2>{}</h2><p class=\"lead\">{}{}</p><p class=\"note\">{} {minutes}</p></section>\n",
         data.pick_text("What to record next", "下一步记录什么"),
-        super::place::capitalise_first(data.tongue.translate_experiment(next).trim_end_matches(['.', '。'])),
+        super::text::capitalise_first(data.tongue.translate_experiment(next).trim_end_matches(['.', '。'])),
         data.pick_text(".", "。"),
         data.pick_text("about", "约"),
     )

@@ -33,20 +33,14 @@ fn render_region(data: &Data<'_>, lane: usize, region: &Region) -> String {
     let colour = if lane < REGIONS_MAX { format!("e{lane}") } else { "none".to_owned() };
     format!(
         "<li><i class=\"{colour} s4\"></i><div><strong>{}</strong><p>{place}{}</p><p class=\"note\">{}</p></div></li>",
-        capitalise_first(&tongue.name_effect(&region.effect)),
+        super::text::capitalise_first(&tongue.name_effect(&region.effect)),
         data.pick_text(".", "。"),
         describe_region(data, region)
     )
 }
 
-/// First letter upper case, where it is a plain letter.
-pub(super) fn capitalise_first(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
-}
-
 fn describe_region(data: &Data<'_>, region: &Region) -> String {
-    let share = super::missing::format_percent(100.0 * region.share);
+    let share = super::text::format_percent(100.0 * region.share);
     let mut facts = match data.tongue.0 {
         Language::En => vec![format!("{share} of what is missing lies here")],
         Language::Zh => vec![format!("缺失部分的{share}位于此处")],

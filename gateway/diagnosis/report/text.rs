@@ -297,6 +297,24 @@ fn power_end(text: &str) -> usize {
     text.find(|c: char| !(c.is_alphanumeric() || c == '.')).unwrap_or(text.len())
 }
 
+/// First letter upper case, where it is a plain letter.
+pub(super) fn capitalise_first(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// A share in percent; what is less than a tenth of a percent from none or all is told so.
+pub(super) fn format_percent(x: f64) -> String {
+    let text = match x {
+        x if x <= 0.0 => "0".to_owned(),
+        x if x >= 100.0 => "100".to_owned(),
+        x if x <= 0.1 => "&lt;\u{202f}0.1".to_owned(),
+        x if x >= 99.9 => "&gt;\u{202f}99.9".to_owned(),
+        x => format_fixed(x, i32::from(!(1.0..=99.0).contains(&x))),
+    };
+    with_unit(&text, "%")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

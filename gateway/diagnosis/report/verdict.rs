@@ -93,7 +93,7 @@ fn format_lead(data: &Data<'_>) -> String {
     match diagnosis.verdict {
         Verdict::CannotTell => {
             let needed = data.pick_text(&diagnosis.summary.en, &diagnosis.summary.zh);
-            super::place::capitalise_first(&escape_html(needed.strip_prefix("Cannot tell: ").unwrap_or(needed)))
+            super::text::capitalise_first(&escape_html(needed.strip_prefix("Cannot tell: ").unwrap_or(needed)))
         }
         Verdict::NoMismatch if !diagnosis.remainder.is_empty() => {
             escape_html(data.pick_text(&diagnosis.summary.en, &diagnosis.summary.zh))

@@ -77,6 +77,8 @@ impl OffsetAccount {
         axis: Axis,
         [base_um, before_um, asked_um]: [f64; 3],
     ) -> Result<f64, SourceError> {
+        // The wall before the machine: whatever was proposed, no shift from what the operator has set is greater.
+        assert!((asked_um - base_um).abs() <= MOST_UM + 1e-6, "{}: {asked_um} um from {base_um} um", axis.as_word());
         let settled = self.shares[axis.index()];
         self.shares[axis.index()].record_intended_write(base_um, before_um, asked_um);
         if let Err(error) = self.journal.store_leftover(axis, self.find_leftover(axis)) {

@@ -5,9 +5,9 @@ use super::{OffsetBound, OffsetOutcome, OffsetVerdict};
 use crate::audit::{Author, truncate_text};
 use crate::limits::OffsetConfig;
 use adapter_core::offset::{Axis, LastWrite};
-use gateway_base::row_rate::RowRate;
-use gateway_history::Audit;
-use rules::script::OffsetProposal;
+use adapter_core::request::OffsetProposal;
+use gateway_records::Audit;
+use gateway_records::RowRate;
 
 /// What was last recorded of the proposals for an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]

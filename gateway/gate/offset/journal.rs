@@ -7,7 +7,7 @@
 //! A control that the configuration no longer names keeps its entry: what is shifted there a person has to see to.
 
 use adapter_core::offset::{Axis, Left};
-use gateway_base::files::replace_durably;
+use gateway_files::files::replace_durably;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io;

@@ -31,9 +31,9 @@ pub use order::{Moved, OffsetOrder, Shifted};
 use super::hold::Hold;
 use crate::limits::{GateMode, OffsetConfig};
 use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::integer::saturate_to_ns;
 use adapter_core::offset::Axis;
-use gateway_base::convert::saturate_to_ns;
-use rules::script::OffsetProposal;
+use adapter_core::request::OffsetProposal;
 
 /// What became of a proposal.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -93,6 +93,7 @@ fn encode_numbers(
     scratch: &mut Scratch,
     out: &mut Vec<u8>,
 ) -> SeriesWritten {
+    debug_assert_eq!(values.len(), missing.len(), "every value has its code");
     let any_missing = missing.iter().any(|code| *code != PRESENT);
     let present = &mut scratch.present;
     present.clear();
@@ -137,6 +138,8 @@ fn put_planes(values: &[f64], out: &mut Vec<u8>) {
 }
 
 fn encode_words(changes: &[(usize, Word)], rows: usize, out: &mut Vec<u8>) -> SeriesWritten {
+    debug_assert!(changes.is_sorted_by(|a, b| a.0 < b.0), "changes come in the order of their rows");
+    debug_assert!(changes.last().is_none_or(|(row, _)| *row < rows), "a change is one of the rows");
     let mut words: Vec<&str> = Vec::new();
     let mut runs: Vec<u8> = Vec::new();
     let mut count = 0u64;

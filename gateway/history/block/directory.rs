@@ -24,6 +24,12 @@ pub(crate) struct ByteSpan {
     pub(crate) unpacked: usize,
 }
 
+impl ByteSpan {
+    pub(crate) fn end(self) -> usize {
+        self.offset + self.stored
+    }
+}
+
 /// One series of a block.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SeriesEntry {
@@ -49,8 +55,21 @@ impl Directory {
         self.entries.iter().find(|entry| entry.series == series)
     }
 
+    /// Does every span begin where the one before ends?
+    pub(crate) fn has_adjacent_spans(&self) -> bool {
+        let spans: Vec<ByteSpan> = std::iter::once(self.times).chain(self.entries.iter().map(|it| it.span)).collect();
+        spans.windows(2).all(|pair| pair[0].end() == pair[1].offset)
+    }
+
+    /// Where the last span ends: offsets follow from the lengths.
+    pub(crate) fn end_offset(&self) -> usize {
+        self.entries.last().map_or(self.times, |entry| entry.span).end()
+    }
+
     /// The directory as bytes. Offsets follow from the lengths and are not written.
     pub(crate) fn to_bytes(&self) -> Vec<u8> {
+        debug_assert!(self.rows <= ROWS_MAX, "no reader takes more rows");
+        debug_assert!(self.times.offset == 0, "the times are the first stream");
         let mut out = vec![VERSION];
         append_varint(&mut out, self.rows as u64);
         put_span(&mut out, self.times);

@@ -78,6 +78,9 @@ impl Encoder {
         segment: i64,
         first_row: i64,
     ) -> Block {
+        debug_assert!(!rows.at_ns.is_empty() && first_row >= 0, "a block has a row, and rows are numbered from 0");
+        debug_assert!(rows.at_ns.is_sorted(), "times of a segment go forward");
+        debug_assert!(rows.columns.len() <= series.len(), "every column has its series");
         let mut directory = Directory { rows: rows.len(), ..Directory::default() };
         let mut columns;
         let mut summaries = Vec::new();
@@ -92,6 +95,8 @@ impl Encoder {
             let cells::SeriesWritten { encoding, summary, any_missing } = written;
             directory.entries.push(SeriesEntry { series: series.id, encoding, any_missing, summary, span });
         }
+        debug_assert!(directory.has_adjacent_spans(), "offsets that are not written follow from the lengths");
+        debug_assert!(columns.len() == directory.end_offset(), "the spans follow each other up to the end");
         directory.note_words(&codes_in(rows), reasons);
         let key = BlockKey {
             segment,
@@ -123,7 +128,10 @@ impl Encoder {
             Some(packed) => columns.extend_from_slice(&packed),
             None => columns.extend_from_slice(&self.plain),
         }
-        ByteSpan { offset, stored: columns.len() - offset, unpacked }
+        let span = ByteSpan { offset, stored: columns.len() - offset, unpacked };
+        debug_assert!(span.stored <= span.unpacked, "a stream that does not get shorter is stored as it is");
+        debug_assert!(span.unpacked <= UNPACKED_MAX, "what is written can be read back");
+        span
     }
 }
 

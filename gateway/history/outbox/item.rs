@@ -1,12 +1,12 @@
 //! One thing that leaves the box.
 
 use crate::pyramid::LEVELS;
-use crate::record::Record;
 use crate::{Series, SeriesKind};
 use adapter_core::ChannelId;
 use adapter_core::channel::{Channel, Form};
 use adapter_core::clock::TimeNs;
 use gateway_base::moment;
+use gateway_records::Record;
 use serde_json::{Value as Json, json};
 use std::sync::Arc;
 

@@ -5,9 +5,9 @@
 //! or day. A cell is a number, a text, or `{"m":"reason"}`. Where the time was moved since, `"d"` says by how much, ns.
 
 use super::item::{Cell, Content, Gap, Item, Reading, SeriesInfo, SeriesMean};
-use crate::record::Record;
 use crate::tail::{append_comma, put_number};
 use adapter_core::clock::TimeNs;
+use gateway_records::Record;
 use serde::Deserialize;
 use serde_json::{Map, Value as Json, json};
 use std::collections::{BTreeMap, HashMap};

@@ -278,6 +278,7 @@ fn add(db: &Connection, stored: &mut OutboxContents, lines: &[(TimeNs, Cow<'_, s
         "INSERT INTO outbox (first_sequence, items, start_ns, end_ns, bytes, body) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
     )
     .and_then(|mut insert| {
+        debug_assert!(stored.next_sequence > 0, "a number 0 would name no item");
         let first = to_stored_number(stored.next_sequence)?;
         insert.execute(params![first, lines.len() as i64, start_ns, end_ns, clamp_to_signed(bytes), body])
     })

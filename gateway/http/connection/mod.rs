@@ -21,6 +21,7 @@ mod tls;
 pub use tls::{Certificate, CertificateError};
 
 use super::ApiProblem;
+use crate::connection::talk::format_response;
 use axum::Router;
 use gateway_base::convert::clamp_to_length;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
@@ -98,13 +99,4 @@ fn turn_away(stream: TcpStream) {
     if let Ok(mut stream) = stream.into_std() {
         let _gone = stream.write_all(format_response(&problem, "503 Service Unavailable").as_bytes());
     }
-}
-
-/// A problem as the text of a whole answer, for where there is no request to answer.
-fn format_response(problem: &ApiProblem, status: &str) -> String {
-    let body = serde_json::to_string(problem).unwrap_or_default();
-    let length = body.len();
-    format!(
-        "HTTP/1.1 {status}\r\nContent-Type: application/problem+json\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n{body}"
-    )
 }

@@ -1,6 +1,5 @@
 //! One connection: encrypted where that is wanted, one request after another, each with its head in time.
 
-use super::format_response;
 use super::slow_reader::Paced;
 use super::table::{ConnectionActivity, ConnectionEntry, Waits};
 use crate::ApiProblem;
@@ -167,4 +166,13 @@ impl http_body::Body for TrackedBody {
     fn size_hint(&self) -> SizeHint {
         self.body.size_hint()
     }
+}
+
+/// A problem as the text of a whole answer, for where there is no request to answer.
+pub(crate) fn format_response(problem: &ApiProblem, status: &str) -> String {
+    let body = serde_json::to_string(problem).unwrap_or_default();
+    let length = body.len();
+    format!(
+        "HTTP/1.1 {status}\r\nContent-Type: application/problem+json\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n{body}"
+    )
 }

@@ -23,12 +23,10 @@ use rules::estimators::thermal::{
     ThermalModel, ThermalPrediction,
 };
 use rules::script::OffsetProposal;
-use sensors::SensorAlarms;
+use sensors::{SOURCE, SensorAlarms};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Who writes the events.
-const SOURCE: &str = "thermal";
 /// What was learned from readings, in the data directory.
 const MEMORY: &str = "thermal.json";
 /// The law looks at the temperatures so often: heat is slow.

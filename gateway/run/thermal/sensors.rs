@@ -8,6 +8,9 @@ use gateway_history::{Alarm, AlarmClear};
 use gateway_status::AlarmStatus;
 use rules::estimators::thermal::{DoubtedSensor, SensorFault, SensorWatch};
 
+/// Who writes the events.
+pub(super) const SOURCE: &str = "thermal";
+
 /// A sensor that is silent for a moment is none that is lost, ns.
 const LOST_NS: i64 = 30 * SECOND_NS;
 
@@ -53,7 +56,7 @@ impl SensorAlarms {
         self.standing.retain(|alarm| {
             let stays = doubted.iter().any(|(code, text)| *code == alarm.code && text[0] == alarm.en);
             if !stays {
-                let (code, source) = (alarm.code.clone(), super::SOURCE.to_owned());
+                let (code, source) = (alarm.code.clone(), SOURCE.to_owned());
                 health.keep_record(AlarmClear { at_ns, code, source }.into());
             }
             stays
@@ -62,7 +65,7 @@ impl SensorAlarms {
             if self.standing.iter().any(|alarm| alarm.code == code) {
                 continue;
             }
-            let (source, severity) = (super::SOURCE.to_owned(), "warning".to_owned());
+            let (source, severity) = (SOURCE.to_owned(), "warning".to_owned());
             let raised = Alarm { at_ns, code: code.clone(), source, severity, en: en.clone(), zh: zh.clone() };
             health.keep_record(raised.into());
             self.standing.push(StandingAlarm { code, since_ns: at_ns, en, zh });

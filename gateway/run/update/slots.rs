@@ -1,11 +1,13 @@
 //! The versions on the disk. Everything that changes which one runs is one rename.
 
 use super::UpdateError;
-use super::trial::CONFIRMED;
 use std::fs;
 use std::io::Write;
 use std::os::unix::fs::{OpenOptionsExt, symlink};
 use std::path::{Path, PathBuf};
+
+/// The file in the data directory in which the service confirms a version: the name of its slot.
+pub(super) const CONFIRMED: &str = "confirmed";
 
 /// Name of the slot that belongs to the package.
 pub const PACKAGE_SLOT: &str = "package";

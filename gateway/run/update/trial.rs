@@ -2,7 +2,7 @@
 
 use super::UpdateError;
 use super::look::{ServiceControl, slot_of_process};
-use super::slots::{TRIAL_STARTS, Trial, VersionSlots, read_confirmed};
+use super::slots::{CONFIRMED, TRIAL_STARTS, Trial, VersionSlots, read_confirmed};
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -14,8 +14,6 @@ pub const WELL_FOR: Duration = Duration::from_secs(30);
 pub const CONFIRM_WITHIN: Duration = Duration::from_secs(75);
 /// The longest time in which a history is copied: ten gigabytes at the pace of a worn card.
 const COPY_WITHIN: Duration = Duration::from_secs(1_200);
-/// The file in the data directory in which the service confirms a version: the name of its slot.
-pub(super) const CONFIRMED: &str = "confirmed";
 
 /// How a trial ended. What runs after it is another question, see [`super::look_until_runs`].
 #[derive(Debug, Clone, PartialEq, Eq)]

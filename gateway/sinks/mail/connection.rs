@@ -4,7 +4,7 @@ use super::{LineSecurity, MailTarget};
 use crate::SinkError;
 use crate::alarms::KeptConnection;
 use crate::webhook::format_place;
-use adapter_core::tls::{TlsError, TlsFiles};
+use device_line::tls::{TlsError, TlsFiles};
 use lettre::Address;
 use lettre::transport::smtp::Error;
 use lettre::transport::smtp::authentication::{Credentials, DEFAULT_MECHANISMS};

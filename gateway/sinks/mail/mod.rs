@@ -10,9 +10,9 @@ mod message;
 use super::address::TargetError;
 use super::alarms::{AlarmChoice, AlarmLine, AlarmMessage, AlarmSink, reuse_connection};
 use super::{Pending, SinkError};
-use adapter_core::address::{Endpoint, Keys, Login, parse_endpoint, tls_files};
-use adapter_core::tls::TlsFiles;
+use adapter_core::address::{Endpoint, Keys, Login, parse_endpoint};
 use connection::{RefusedRecipients, SmtpConnection, describe_refused};
+use device_line::tls::TlsFiles;
 use gateway_base::clock;
 use gateway_history::Outbox;
 use lettre::message::Mailbox;
@@ -55,7 +55,7 @@ pub struct MailTarget {
 
 impl MailTarget {
     pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, TargetError> {
-        let tls = tls_files(keys, secured);
+        let tls = TlsFiles::from_keys(keys, secured);
         let starttls = secured && keys.take_choice("starttls", &[("no", false), ("yes", true)]);
         let (security, port) = match (secured, starttls) {
             (false, _) => (LineSecurity::Plain, 25),

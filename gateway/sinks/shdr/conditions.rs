@@ -3,8 +3,7 @@
 //! A FANUC control names the kind of an alarm by the two letters of its code (B-64485EN, alarm list); a code without such letters is
 //! one of the gateway, of a script, or of another make: those are the condition of the gateway itself.
 
-use super::lines::replace_separators;
-use super::model::Component;
+use super::model::{Component, replace_separators};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct AlarmKind {

@@ -3,7 +3,7 @@
 //! Source: MTConnect agent, "Adapter Agent Protocol" (SHDR): data items, conditions, assets, heartbeat.
 
 use super::conditions::{self, AlarmKind, OWN};
-use super::model::{AVAILABILITY, UNAVAILABLE, of_channel};
+use super::model::{AVAILABILITY, UNAVAILABLE, of_channel, replace_separators};
 use adapter_core::clock::TimeNs;
 use gateway_base::moment;
 use gateway_history::{Alarm, Cell, Content, Item, Reading, Record};
@@ -178,11 +178,6 @@ fn build_alarm_lines(alarm: &Alarm) -> Vec<String> {
         format!("{}|{level}|{code}|{severity}||{text}", condition.name)
     };
     conditions::split_alarm(&alarm.source, &alarm.code, &alarm.en).map(line).collect()
-}
-
-/// Bars and ends of lines have a meaning of their own.
-pub(super) fn replace_separators(text: &str) -> String {
-    text.replace(|letter: char| letter == '|' || letter.is_control(), " ")
 }
 
 /// Text within an attribute of XML.

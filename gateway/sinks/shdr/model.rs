@@ -5,7 +5,6 @@
 //!
 //! Source: MTConnect Standard 1.4, Part 2 (devices), tables of data items and units. Newer agents read it as well.
 
-use super::lines::replace_separators;
 use gateway_history::Cell;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -170,6 +169,11 @@ pub(super) const UNAVAILABLE: &str = "UNAVAILABLE";
 /// The data item of a channel.
 pub(super) fn of_channel(channel: &str) -> Option<&'static DataItem> {
     ITEMS.iter().find(|item| item.channel == channel)
+}
+
+/// Bars and ends of lines have a meaning of their own.
+pub(super) fn replace_separators(text: &str) -> String {
+    text.replace(|letter: char| letter == '|' || letter.is_control(), " ")
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::SinkError;
 use crate::alarms::KeptConnection;
 use adapter_core::address::Endpoint;
-use adapter_core::tls::TlsFiles;
+use device_line::tls::TlsFiles;
 use hmac::{Hmac, KeyInit, Mac};
 use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::Bytes;

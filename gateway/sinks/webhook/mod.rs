@@ -12,10 +12,10 @@ use super::alarms::{AlarmChoice, AlarmLine, AlarmMessage, AlarmSink, reuse_conne
 use super::mqtt::build_document;
 use super::nats::format_message_id;
 use super::{Pending, SinkError};
-use adapter_core::address::{Endpoint, Keys, parse_endpoint, tls_files};
-use adapter_core::tls::TlsFiles;
+use adapter_core::address::{Endpoint, Keys, parse_endpoint};
 pub(crate) use client::format_place;
 use client::{HttpConnection, Post};
+use device_line::tls::TlsFiles;
 use gateway_history::Outbox;
 use std::path::PathBuf;
 
@@ -38,7 +38,7 @@ pub struct WebhookTarget {
 
 impl WebhookTarget {
     pub(super) fn parse(body: &str, keys: &mut Keys, secured: bool) -> Result<Self, TargetError> {
-        let tls = tls_files(keys, secured);
+        let tls = TlsFiles::from_keys(keys, secured);
         let choice = AlarmChoice::from_keys(keys);
         let secret_file = keys.take_text("secret_file").map(PathBuf::from);
         let body = body.strip_prefix("//").unwrap_or(body);

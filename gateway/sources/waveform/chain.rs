@@ -1,8 +1,7 @@
 //! Filter and feature of one stream.
 
-use super::to_nanoseconds;
 use adapters::Stamp;
-use adapters::clock::TimeNs;
+use adapters::clock::{SECOND_NS, TimeNs};
 use adapters::waveform::{AMPLITUDE, Block, WaveformHeader};
 use rules::estimators::spindle_current::{
     Feature, FeatureKind, LowPass, LowPassDesign, PhaseFeature, ThreePhase, WindowSpan,
@@ -145,6 +144,11 @@ impl Sums {
         }
         Some((Stamp::of_request(self.raw_ns.0, self.raw_ns.1), (self.raw_square_a2 / self.raw_samples).sqrt()))
     }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "a cast from a double saturates")]
+pub(crate) fn to_nanoseconds(seconds: f64) -> TimeNs {
+    (seconds * SECOND_NS as f64) as i64
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! and five behind. The files are CSV as `serve waveform --file` plays them. Bounded: one file at a time, fifty files in the
 //! directory, the oldest go.
 
-use super::to_nanoseconds;
+use crate::waveform::chain::to_nanoseconds;
 use adapters::clock::TimeNs;
 use adapters::waveform::{Block, WaveformHeader};
 use gateway_base::files::keep_last;

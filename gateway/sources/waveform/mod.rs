@@ -22,7 +22,7 @@ mod features;
 pub use control_sampling::ControllerSamples;
 
 use adapters::address::{Address, Endpoint, Target, WaveformKeep};
-use adapters::clock::{Clock, SECOND_NS, TimeNs};
+use adapters::clock::Clock;
 use adapters::driver::Fact;
 use adapters::open::{OpenError, Opened, Refused};
 use adapters::waveform::Receiver;
@@ -105,9 +105,4 @@ impl Source for SpindleCurrent {
     fn collect_facts(&self) -> Vec<Fact> {
         self.features.list_facts(self.receiver.intake())
     }
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "a cast from a double saturates")]
-fn to_nanoseconds(seconds: f64) -> TimeNs {
-    (seconds * SECOND_NS as f64) as i64
 }

@@ -5,7 +5,7 @@ use super::follower::{FedShare, OverrideFollower};
 use super::limits::LearnedLimits;
 use super::load_inputs::{LoadChannels, LoadMoment};
 use super::place::Place;
-use super::tool_fall::{FallMoment, FallWatch};
+use super::tool_fall::{FallMoment, FallWatch, PLACES_MAX};
 use crate::NoEstimate;
 use crate::signals::seconds_between;
 use adapter_core::clock::TimeNs;
@@ -14,8 +14,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Places that are kept; beyond, the one that was not used for longest is forgotten.
-pub const PLACES_MAX: usize = 1024;
 /// Characters of a block that count.
 const BLOCK_MAX: usize = 24;
 /// Standard deviations of the cutting power by which an excess must exceed its limit.

@@ -30,7 +30,7 @@ mod tool_fall;
 mod tests;
 
 pub use curves::{LoadCurves, LoadCurvesError};
-pub use learned_load::PLACES_MAX;
+pub use tool_fall::PLACES_MAX;
 
 use super::estimate::{Estimates, NoEstimate};
 use super::settings::Settings;

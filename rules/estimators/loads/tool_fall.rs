@@ -18,11 +18,13 @@
 //! may have changed the edge. A thinner allowance of one cut looks the same.
 
 use super::fall_chain::{ChangeChain, Mean};
-use super::learned_load::PLACES_MAX;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+
+/// Places that are kept; beyond, the one that was not used for longest is forgotten.
+pub const PLACES_MAX: usize = 1024;
 
 /// No cutter with inserts has more teeth than makes a smaller fall than this: ten.
 const LEAST_FALL: f64 = 0.03;

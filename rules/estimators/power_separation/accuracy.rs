@@ -5,8 +5,7 @@
 //! practice, 0.15 and 0.25 of the cutting power, would have told from the same power and the same no-load power.
 
 use super::cuts::SteadyPoint;
-use super::forms::fit_best_form;
-use super::load_loss::is_same_speed;
+use super::forms::{fit_best_form, is_same_speed};
 use crate::LoadLossLaw;
 use numerics::statistics::count_to_f64;
 use serde::Serialize;

@@ -11,7 +11,7 @@
 //! ([`UnequalScatter`]).
 
 use super::cuts::SteadyPoint;
-use super::load_loss::is_same_speed;
+use super::stretches::SAME_SPEED;
 use crate::LoadLossLaw;
 use crate::regression::{Column, FTest, Intercept, Refusal, Regression, UnequalScatter, fit_unweighted};
 use numerics::statistics::count_to_f64;
@@ -111,4 +111,8 @@ fn build_design(points: &[&SteadyPoint], speeds: &[f64], speed_rpm: Option<f64>,
         columns.push(column(format!("Pc^2{name}"), &|point| inside(point) * square(point)));
     }
     (y, columns)
+}
+
+pub(super) fn is_same_speed(a: f64, b: f64) -> bool {
+    (a / b - 1.0).abs() <= SAME_SPEED
 }

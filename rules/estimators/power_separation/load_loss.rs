@@ -5,10 +5,10 @@
 
 use super::accuracy::{Accuracy, evaluate_accuracy};
 use super::cuts::{SteadyPoint, collect_points};
-use super::forms::{FittedLoss, FormResiduals, by_speed, fit_best_form};
+use super::forms::{FittedLoss, FormResiduals, by_speed, fit_best_form, is_same_speed};
 use super::reference::{PowerReference, ReferenceChoice, select_reference};
 use super::rows::classify_rows;
-use super::stretches::{SAME_SPEED, find_stretches};
+use super::stretches::find_stretches;
 use crate::regression::{CONFIDENCE, FTest, Refusal, RefusalKind, Regression, UnequalScatter, t_quantile};
 use crate::{LoadLossDoubt, LoadLossLaw, STAGES};
 use numerics::statistics::count_to_f64;
@@ -214,10 +214,6 @@ fn list_cut_speeds(points: &[&SteadyPoint]) -> Vec<f64> {
         }
     }
     speeds
-}
-
-pub(super) fn is_same_speed(a: f64, b: f64) -> bool {
-    (a / b - 1.0).abs() <= SAME_SPEED
 }
 
 fn check_span(cuts: &[f64]) -> Result<(), Refusal> {

@@ -22,8 +22,8 @@ use super::edge_state::{CuttingEdge, EdgeMeasurement, OperationGroup, WearNews};
 use super::gaussian::Gaussian;
 use super::outlook::{Known, Outlook};
 use super::prior::*;
-use super::tool_name::edge_of;
 use super::work::{EdgeWork, WorkKey, WorkReference};
+use adapter_core::tool_name::edge_of;
 use serde::{Deserialize, Serialize};
 
 /// Follows the edges of one machine.

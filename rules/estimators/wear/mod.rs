@@ -17,7 +17,6 @@
 //! | `compare` | both forms on cuts that they have not seen |
 //! | `model`, `power_prediction` | either form, and what it says of a cut |
 //! | `threshold` | the limit `[Pc]`, the wear from a power, observable here or not |
-//! | `tool_name` | tool and edge in a name |
 //! | `model_selection` | the model of a library for a cut |
 //! | `work` | what an edge did in one part, against what a sharp one takes |
 //! | `gaussian`, `edge_state`, `follow` | the wear of every edge, followed by a Kalman filter |
@@ -52,10 +51,11 @@ mod script_numbers;
 mod surface;
 mod term;
 mod threshold;
-mod tool_name;
 mod unseen_edges;
 mod work;
 
+pub use adapter_core::model_library::WearKey;
+pub use adapter_core::tool_name::{edge_of, tool_of};
 pub use anova::{Anova, AnovaRow};
 pub use coding::{Coding, Range};
 pub use compare::{FormComparison, FormErrors, compare_forms};
@@ -75,12 +75,11 @@ pub use orthogonal_array::Array;
 pub use outlook::{OBSERVED_SHARE, Outlook};
 pub use physical::{FittedNumber, PHYSICAL_NAMES, Physical, PhysicalFit, fit_physical};
 pub use power_prediction::Predicted;
-pub use record::{WearKey, WearRecord};
+pub use record::WearRecord;
 pub use script_numbers::{SHORT_FORM, SHORT_LENGTH};
 pub use surface::{Surface, build_published_surface, published_over};
 pub use term::{WearTerm, second_order};
 pub use threshold::{
     OBSERVABLE_SHARE, Observability, POOLED_PARTS_MAX, PowerLimit, WearEstimate, compute_power_limit, estimate_wear,
 };
-pub use tool_name::{edge_of, tool_of};
 pub use work::{CutMoment, EdgeWork, WorkKey, WorkReference};

@@ -1,7 +1,8 @@
 //! Which model of a library is for this cut: the exact edge before its tool, then the operation, the work material, any.
 
-use super::record::{WearKey, WearRecord};
-use super::tool_name::tool_of;
+use super::record::WearRecord;
+use adapter_core::model_library::WearKey;
+use adapter_core::tool_name::tool_of;
 use std::sync::Arc;
 
 /// A model, and what speaks for it.
@@ -13,26 +14,20 @@ pub struct ChosenModel<'a, R> {
     pub by: &'static str,
 }
 
-impl WearKey {
-    /// How well a model with this key fits a cut; `None` when it names something else than the cut. An empty text of the model
-    /// fits everything; a model of a tool fits all edges of it.
-    #[must_use]
-    pub fn rank_fit(&self, cut: &Self) -> Option<u8> {
-        let agrees = |mine: &str, theirs: &str| mine.is_empty() || mine == theirs;
-        let edge = !self.tool.is_empty() && self.tool == cut.tool;
-        let tool = edge || self.tool == tool_of(&cut.tool);
-        let others = [
-            (&self.machine, &cut.machine),
-            (&self.work_material, &cut.work_material),
-            (&self.operation, &cut.operation),
-        ];
-        if !(self.tool.is_empty() || tool) || !others.iter().all(|(mine, theirs)| agrees(mine, theirs)) {
-            return None;
-        }
-        let named = [edge, tool && !self.tool.is_empty(), !self.operation.is_empty(), !self.work_material.is_empty()];
-        let named = named.into_iter().chain([!self.machine.is_empty()]);
-        Some(named.fold(0, |sum, named| 2 * sum + u8::from(named)))
+/// How well a model with this key fits a cut; `None` when it names something else than the cut. An empty text of the model
+/// fits everything; a model of a tool fits all edges of it.
+fn rank_fit(key: &WearKey, cut: &WearKey) -> Option<u8> {
+    let agrees = |mine: &str, theirs: &str| mine.is_empty() || mine == theirs;
+    let edge = !key.tool.is_empty() && key.tool == cut.tool;
+    let tool = edge || key.tool == tool_of(&cut.tool);
+    let others =
+        [(&key.machine, &cut.machine), (&key.work_material, &cut.work_material), (&key.operation, &cut.operation)];
+    if !(key.tool.is_empty() || tool) || !others.iter().all(|(mine, theirs)| agrees(mine, theirs)) {
+        return None;
     }
+    let named = [edge, tool && !key.tool.is_empty(), !key.operation.is_empty(), !key.work_material.is_empty()];
+    let named = named.into_iter().chain([!key.machine.is_empty()]);
+    Some(named.fold(0, |sum, named| 2 * sum + u8::from(named)))
 }
 
 /// The best model for a cut; of equals the last, which is the newest. `key` reads what a model is for.
@@ -41,7 +36,7 @@ pub fn choose_model<'a, R>(
     cut: &WearKey,
     key: impl Fn(&R) -> &WearRecord,
 ) -> Option<ChosenModel<'a, R>> {
-    let fitting = models.iter().filter_map(|model| Some((key(model).key.rank_fit(cut)?, model)));
+    let fitting = models.iter().filter_map(|model| Some((rank_fit(&key(model).key, cut)?, model)));
     let (rank, record) = fitting.max_by_key(|(rank, _)| *rank)?;
     // From the lowest bit of the rank upwards.
     let words = ["machine", "work material", "operation", "tool", "edge"];

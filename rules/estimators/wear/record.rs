@@ -2,22 +2,10 @@
 
 use super::conditions::FACTORS;
 use super::model::WearModel;
+use adapter_core::model_library::{LibraryModel, LibraryRow, WearKey};
 use serde::{Deserialize, Serialize};
 
 const SCHEMA: &str = "wear/1";
-
-/// What a model is for. The library finds a model by these four texts.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, Default)]
-pub struct WearKey {
-    /// Name of the machine.
-    pub machine: String,
-    /// Tool, as the controller or the recipe names it.
-    pub tool: String,
-    /// Work material, as the recipe names it.
-    pub work_material: String,
-    /// Operation, as the recipe names it.
-    pub operation: String,
-}
 
 /// A model, what it is for, and where it comes from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -37,6 +25,31 @@ pub struct WearRecord {
     pub r2: f64,
     /// The fitted surface or physical form.
     pub model: WearModel,
+}
+
+impl LibraryModel for WearRecord {
+    type Error = String;
+
+    fn to_row(&self) -> Result<LibraryRow, Self::Error> {
+        let residual_sd_w = match &self.model {
+            WearModel::Surface(surface) => surface.residual_sd_w,
+            WearModel::Physical(physical) => physical.residual_sd_w,
+        };
+        Ok(LibraryRow {
+            key: self.key.clone(),
+            form: self.model.form(),
+            criterion_mm: self.criterion_mm,
+            cuts: self.cuts,
+            residual_sd_w,
+            r2: self.r2,
+            origin: self.origin.clone(),
+            toml: self.to_toml()?,
+        })
+    }
+
+    fn from_toml(text: &str) -> Result<Self, Self::Error> {
+        Self::parse(text)
+    }
 }
 
 impl WearRecord {

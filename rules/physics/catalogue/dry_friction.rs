@@ -2,7 +2,7 @@
 
 use adapter_core::channel::quantity::Quantity;
 use crate::drive::{RAD_PER_S_OF_RPM, read_motion, compute_soft_sign, is_rotary_drive};
-use crate::excitation::find_greatest_magnitude;
+use numerics::statistics::find_greatest_magnitude;
 use crate::state::{compute_presliding_state, measure_strokes};
 use crate::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Scene, Texts};
 

@@ -1,10 +1,10 @@
 //! Friction on a worn flank: grows with the cutting time of the tool, starts again with a new edge.
 
 use crate::drive::is_displacement;
-use crate::excitation::{UNIT_TO_UNIT, find_greatest_magnitude, list_units};
+use crate::excitation::{UNIT_TO_UNIT, list_units};
 use crate::tool_load;
 use crate::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
-use numerics::statistics::count_to_f64;
+use numerics::statistics::{count_to_f64, find_greatest_magnitude};
 use std::borrow::Cow;
 
 /// Friction between a worn flank and the work.

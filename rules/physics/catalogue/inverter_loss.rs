@@ -1,7 +1,8 @@
 //! Losses in the inverter: grow with current.
 
 use crate::drive::{is_power, read_speed_krpm, compute_torque_at_1000_rpm};
-use crate::excitation::{find_greatest_magnitude, has_variation};
+use crate::excitation::has_variation;
+use numerics::statistics::find_greatest_magnitude;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 use std::f64::consts::LN_2;
 

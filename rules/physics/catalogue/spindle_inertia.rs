@@ -1,7 +1,8 @@
 //! Power and torque that accelerate spindle, chuck and work.
 
 use crate::drive::{INERTIA_KG_M2_MAX, RAD_PER_S_OF_RPM, read_driven_speed_krpm, read_spindle_rate_rpm_per_s};
-use crate::excitation::{find_greatest_magnitude, count_visits};
+use crate::excitation::count_visits;
+use numerics::statistics::find_greatest_magnitude;
 use crate::{Effect, EffectDoc, Form, OutputKind, ParameterColumns, ParameterDoc, Role, Scene, Texts};
 
 /// Inertia of what the spindle turns.

@@ -1,7 +1,8 @@
 //! At creep the oil film breaks down: friction is higher than when moving.
 
 use crate::drive::{is_power, read_motion, compute_soft_sign, is_rotary_drive};
-use crate::excitation::{find_greatest_magnitude, has_variation, count_visits};
+use crate::excitation::{has_variation, count_visits};
+use numerics::statistics::find_greatest_magnitude;
 use crate::{Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
 
 /// Extra friction at creep speed.

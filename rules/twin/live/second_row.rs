@@ -2,8 +2,8 @@
 
 use adapter_core::channel::{ChannelId, Kind};
 use adapter_core::clock::{SECOND_NS, TimeNs};
+use adapter_core::state::State;
 use adapter_core::{Absence, Sample, Value};
-use estimators::State;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -72,7 +72,7 @@ fn by_default_nothing_is_written_in_an_hour() {
         clock.set_time(tick * TICK_NS);
         let (sample, estimates) = cutting(tick * TICK_NS);
         let decision = host.run_due_scripts(&sample, &estimates);
-        let verdict = gate.decide_override(decision.request.as_ref(), &sample, &estimates);
+        let verdict = gate.decide_override(decision.request.as_ref(), &sample, estimates.state);
         assert_eq!(writer.write_verdict(&verdict, &clock), None);
         permitted.push(verdict.permitted.percent());
     }
@@ -92,14 +92,14 @@ fn arming_needs_the_configuration_a_person_and_ends_by_itself() {
     let lasts_ns = i64::try_from(limits(GateMode::Armed).armed_for.as_nanos()).expect("hours");
     for at_ns in (0..lasts_ns).step_by(9_000_000_000).chain([lasts_ns - 1]) {
         let (sample, estimates) = cutting(at_ns);
-        assert!(gate.decide_override(None, &sample, &estimates).armed);
+        assert!(gate.decide_override(None, &sample, estimates.state).armed);
     }
     let (sample, estimates) = cutting(lasts_ns);
-    assert!(!gate.decide_override(None, &sample, &estimates).armed);
+    assert!(!gate.decide_override(None, &sample, estimates.state).armed);
     assert_eq!(gate.current_arming().err(), Some(Disarmed::Expired));
     gate.arm("fitter", None, lasts_ns).expect("again");
     let (sample, estimates) = cutting(5);
-    assert!(!gate.decide_override(None, &sample, &estimates).armed, "a clock that jumps back disarms");
+    assert!(!gate.decide_override(None, &sample, estimates.state).armed, "a clock that jumps back disarms");
 }
 
 /// A process that was stopped and goes on sees fresh values at once, and has seen none for as long as it stood.
@@ -109,9 +109,9 @@ fn ten_seconds_without_a_tick_end_the_arming_like_ten_seconds_without_values() {
         let mut gate = Gate::new(limits(GateMode::Armed));
         gate.arm("fitter", None, 0).expect("allowed");
         let (sample, estimates) = cutting(TICK_NS);
-        assert!(gate.decide_override(None, &sample, &estimates).armed);
+        assert!(gate.decide_override(None, &sample, estimates.state).armed);
         let (sample, estimates) = cutting(TICK_NS + pause_s * 1_000_000_000);
-        assert_eq!(gate.decide_override(None, &sample, &estimates).armed, armed, "{pause_s} s");
+        assert_eq!(gate.decide_override(None, &sample, estimates.state).armed, armed, "{pause_s} s");
         let why = if pause_s > 3_600 { Disarmed::Expired } else { Disarmed::Silent };
         assert_eq!(gate.current_arming().err(), (!armed).then_some(why), "{pause_s} s");
     }
@@ -123,14 +123,14 @@ fn every_hold_gives_the_programmed_feed_at_once_and_says_why() {
         let mut gate = armed_gate();
         for tick in 0..100 {
             let (sample, estimates) = cutting(tick * TICK_NS);
-            gate.decide_override(Some(&asking(60.0)), &sample, &estimates);
+            gate.decide_override(Some(&asking(60.0)), &sample, estimates.state);
         }
         let (mut sample, mut estimates) = cutting(100 * TICK_NS);
-        let before = gate.decide_override(Some(&asking(60.0)), &sample, &estimates);
+        let before = gate.decide_override(Some(&asking(60.0)), &sample, estimates.state);
         assert_eq!((before.permitted.percent(), before.outcome), (60, GateOutcome::Permitted), "{what}");
         sample.at_ns += TICK_NS;
         change(&mut sample, &mut estimates);
-        let verdict = gate.decide_override(Some(&asking(60.0)), &sample, &estimates);
+        let verdict = gate.decide_override(Some(&asking(60.0)), &sample, estimates.state);
         assert_eq!((verdict.permitted.percent(), verdict.outcome), (100, GateOutcome::Held(hold)), "{what}");
         assert!(
             verdict.reason().starts_with("no override, the dial counts: ") && !hold.describe_in_chinese().is_empty()
@@ -158,8 +158,9 @@ fn threads_in_nc_blocks_hold_until_another_motion() {
         let mut gate = armed_gate();
         let (mut sample, estimates) = cutting(0);
         set_text(&mut sample, "block", block);
-        let mut decide =
-            |sample: &Sample| matches!(gate.decide_override(None, sample, &estimates).outcome, GateOutcome::Held(_));
+        let mut decide = |sample: &Sample| {
+            matches!(gate.decide_override(None, sample, estimates.state).outcome, GateOutcome::Held(_))
+        };
         assert_eq!(decide(&sample), held, "{block}");
         set_text(&mut sample, "block", "X5");
         assert_eq!(decide(&sample), held, "{block}, next line");
@@ -172,7 +173,10 @@ fn threads_in_nc_blocks_hold_until_another_motion() {
 fn off_is_off() {
     let mut gate = Gate::new(limits(GateMode::Off));
     let (sample, estimates) = cutting(0);
-    assert_eq!(gate.decide_override(Some(&asking(80.0)), &sample, &estimates).outcome, GateOutcome::Held(Hold::Off));
+    assert_eq!(
+        gate.decide_override(Some(&asking(80.0)), &sample, estimates.state).outcome,
+        GateOutcome::Held(Hold::Off)
+    );
 }
 
 #[test]
@@ -181,7 +185,7 @@ fn silence_of_the_machine_disarms_after_ten_seconds() {
     for tick in 0..=100 {
         let (mut sample, estimates) = cutting(tick * TICK_NS);
         sample.set_slot(id("mode"), Slot::from_absence(Absence::Disconnected));
-        assert_eq!(gate.decide_override(None, &sample, &estimates).armed, tick < 100, "tick {tick}");
+        assert_eq!(gate.decide_override(None, &sample, estimates.state).armed, tick < 100, "tick {tick}");
     }
     assert_eq!(gate.current_arming().err(), Some(Disarmed::Silent));
 }
@@ -203,7 +207,7 @@ fn whatever_is_asked_for_the_override_stays_in_the_band_and_moves_slowly() {
         if random.next().is_multiple_of(50) {
             cases[(random.next() % cases.len() as u64) as usize].1(&mut sample, &mut estimates);
         }
-        let verdict = gate.decide_override(random.request().as_ref(), &sample, &estimates);
+        let verdict = gate.decide_override(random.request().as_ref(), &sample, estimates.state);
         let now = f64::from(verdict.permitted.percent());
         assert!(now >= limits.min_pct && now <= limits.max_pct, "{verdict:?}");
         let step_s = step_ns as f64 / SECOND_NS as f64;
@@ -230,7 +234,7 @@ fn the_pace_and_the_band_are_told() {
     let mut gate = Gate::new(config::GateConfig { above_dial: true, ..limits(GateMode::Armed) });
     let mut outcome_at = |tick: i64, pct: f64| {
         let (sample, estimates) = cutting(tick * TICK_NS);
-        gate.decide_override(Some(&asking(pct)), &sample, &estimates)
+        gate.decide_override(Some(&asking(pct)), &sample, estimates.state)
     };
     let first = outcome_at(0, 55.0);
     assert_eq!((first.outcome, first.permitted.percent()), (GateOutcome::Limited(Bound::Slew), 100));
@@ -249,7 +253,7 @@ fn never_above_the_operators_dial_unless_configured() {
         for tick in 0..60 {
             let (mut sample, estimates) = cutting(tick * TICK_NS);
             dial.into_iter().for_each(|dial| set_number(&mut sample, "feed_override_dial_pct", dial));
-            last = Some(gate.decide_override(Some(&asking(115.0)), &sample, &estimates));
+            last = Some(gate.decide_override(Some(&asking(115.0)), &sample, estimates.state));
         }
         last.map(|verdict| (verdict.permitted.percent(), verdict.outcome)).expect("decided")
     };
@@ -265,7 +269,7 @@ fn never_above_the_operators_dial_unless_configured() {
         let decide = |tick: i64| {
             let (mut sample, estimates) = cutting(tick * TICK_NS);
             set_number(&mut sample, "feed_override_dial_pct", dial);
-            gate.decide_override(Some(&asking(60.0)), &sample, &estimates)
+            gate.decide_override(Some(&asking(60.0)), &sample, estimates.state)
         };
         (0..60).map(decide).last().map(|verdict| (verdict.permitted.percent(), verdict.outcome)).expect("decided")
     };
@@ -300,7 +304,7 @@ fn run(
     for tick in ticks {
         clock.set_time(tick * TICK_NS);
         let (sample, estimates) = cutting(tick * TICK_NS);
-        let verdict = gate.decide_override(Some(&asking(pct)), &sample, &estimates);
+        let verdict = gate.decide_override(Some(&asking(pct)), &sample, estimates.state);
         if let Some(written) = writer.write_verdict(&verdict, &clock) {
             if let Some(fault) = &written.fault {
                 gate.disarm(fault.disarm_reason());
@@ -378,7 +382,7 @@ fn the_simulated_machine_follows_an_armed_gate_and_returns_to_its_panel() {
     for tick in 0..20 {
         clock.set_time(cut_ns + tick * TICK_NS);
         let (sample, estimates) = cutting(cut_ns + tick * TICK_NS);
-        let verdict: Verdict = gate.decide_override(Some(&asking(80.0)), &sample, &estimates);
+        let verdict: Verdict = gate.decide_override(Some(&asking(80.0)), &sample, estimates.state);
         last = writer.write_verdict(&verdict, &clock).or(last);
     }
     let last = last.expect("it has written");

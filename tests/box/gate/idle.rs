@@ -59,7 +59,7 @@ impl Stand {
         let (mut sample, estimates) = cutting(at_ns);
         set_number(&mut sample, "feed_override_dial_pct", f64::from(dial));
         let request = request.map(asking);
-        let verdict = self.gate.decide_override(request.as_ref(), &sample, &estimates);
+        let verdict = self.gate.decide_override(request.as_ref(), &sample, estimates.state);
         if let Some(fault) = self.writer.write_verdict(&verdict, &self.clock).and_then(|written| written.fault) {
             panic!("{fault}");
         }

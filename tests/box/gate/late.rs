@@ -142,7 +142,7 @@ fn whoever_arms_finds_the_machine_at_its_dial_and_never_with_a_leap() {
     let mut gate = Gate::new(limits(GateMode::Armed));
     let decide = |gate: &mut Gate, tick: i64| {
         let (sample, estimates) = cutting(tick * TICK_NS);
-        gate.decide_override(Some(&asking(60.0)), &sample, &estimates)
+        gate.decide_override(Some(&asking(60.0)), &sample, estimates.state)
     };
     (0..50).for_each(|tick| assert!(!decide(&mut gate, tick).armed));
     assert_eq!(decide(&mut gate, 50).permitted.percent(), 60, "decided while nobody writes");
@@ -260,7 +260,7 @@ fn every_write_says_which_script_of_which_version_asked_for_it_and_why() {
         clock.set_time(tick * TICK_NS);
         let (sample, estimates) = cutting(tick * TICK_NS);
         let request = asking(80.0);
-        let verdict = gate.decide_override(Some(&request), &sample, &estimates);
+        let verdict = gate.decide_override(Some(&request), &sample, estimates.state);
         let _told = trail.audit_override(Some(&request), &verdict);
         let written = writer.write_verdict(&verdict, &clock);
         rows.extend(written.and_then(|written| trail.command_from_write(&written, "lathe")));

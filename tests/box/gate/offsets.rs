@@ -46,8 +46,8 @@ fn resting(at_ns: i64) -> (Sample, Estimates) {
 fn judged(gate: &mut Gate, at_ns: i64, um: Option<f64>) -> Option<OffsetVerdict> {
     let (sample, estimates) = resting(at_ns);
     let proposals: Vec<OffsetProposal> = um.map(|um| proposal(Axis::Z, um)).into_iter().collect();
-    gate.decide_override(None, &sample, &estimates);
-    gate.judge_offsets(&proposals, &sample, &estimates).pop()
+    gate.decide_override(None, &sample, estimates.state);
+    gate.judge_offsets(&proposals, &sample, estimates.state).pop()
 }
 
 fn answer(order: OffsetOrder, result: Result<Option<Shifted>, SourceError>) -> Moved {
@@ -85,7 +85,10 @@ fn a_shift_is_made_by_steps_with_rests_and_never_beyond_the_total() {
     let verdict = judged(&mut gate, 700 * SECOND_NS, Some(30.4)).expect("decided");
     assert_eq!(verdict.outcome, OffsetOutcome::Limited(OffsetBound::Total));
     let (sample, estimates) = resting(701 * SECOND_NS);
-    assert!(!gate.decide_override(None, &sample, &estimates).armed, "armed for offsets only: no override is written");
+    assert!(
+        !gate.decide_override(None, &sample, estimates.state).armed,
+        "armed for offsets only: no override is written"
+    );
 }
 
 #[test]
@@ -100,8 +103,8 @@ fn only_between_programs_with_fresh_values_and_no_alarm() {
         gate.arm("fitter", None, 0).expect("may be armed");
         let (mut sample, mut estimates) = resting(0);
         spoil(&mut sample, &mut estimates);
-        gate.decide_override(None, &sample, &estimates);
-        let verdict = gate.judge_offsets(&[proposal(Axis::Z, 3.0)], &sample, &estimates).pop().expect("decided");
+        gate.decide_override(None, &sample, estimates.state);
+        let verdict = gate.judge_offsets(&[proposal(Axis::Z, 3.0)], &sample, estimates.state).pop().expect("decided");
         assert_eq!((verdict.outcome, verdict.order), (OffsetOutcome::Held(hold), None), "{what}");
     }
 }
@@ -111,8 +114,8 @@ fn other_axes_and_what_is_no_number_move_nothing() {
     let mut gate = Gate::new(offset_limits(GateMode::Armed));
     gate.arm("fitter", None, 0).expect("may be armed");
     let (sample, estimates) = resting(0);
-    gate.decide_override(None, &sample, &estimates);
-    let verdict = gate.judge_offsets(&[proposal(Axis::X, 3.0)], &sample, &estimates).pop().expect("decided");
+    gate.decide_override(None, &sample, estimates.state);
+    let verdict = gate.judge_offsets(&[proposal(Axis::X, 3.0)], &sample, estimates.state).pop().expect("decided");
     assert_eq!((verdict.outcome, verdict.order), (OffsetOutcome::NotAllowed, None));
     for mistake in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let verdict = judged(&mut gate, 0, Some(mistake)).expect("decided");
@@ -310,13 +313,13 @@ fn what_is_in_doubt_is_looked_at_before_anything_is_written_and_other_axes_are_g
     gate.offsets_mut().mark_unsettled(Axis::Z);
     gate.arm("fitter", None, 0).expect("may be armed");
     let (sample, estimates) = resting(0);
-    gate.decide_override(None, &sample, &estimates);
+    gate.decide_override(None, &sample, estimates.state);
     let orders = |gate: &mut Gate, at_ns| {
         let (sample, estimates) = resting(at_ns);
-        gate.decide_override(None, &sample, &estimates);
-        let verdicts = gate.judge_offsets(&[proposal(Axis::Z, 9.0), proposal(Axis::X, 9.0)], &sample, &estimates);
+        gate.decide_override(None, &sample, estimates.state);
+        let verdicts = gate.judge_offsets(&[proposal(Axis::Z, 9.0), proposal(Axis::X, 9.0)], &sample, estimates.state);
         let mut orders: Vec<OffsetOrder> = verdicts.into_iter().filter_map(|verdict| verdict.order).collect();
-        orders.extend(gate.collect_look_orders(&sample, &estimates));
+        orders.extend(gate.collect_look_orders(&sample, estimates.state));
         orders
     };
     assert_eq!(orders(&mut gate, 0), [OffsetOrder::Look(Axis::Z)]);

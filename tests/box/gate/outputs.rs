@@ -97,7 +97,7 @@ fn run(count: u64) -> (Vec<(TimeNs, u8)>, [u64; 3]) {
             cases[(random.next() % cases.len() as u64) as usize].1(&mut sample, &mut estimates);
         }
         let verdict =
-            gate.decide_override(host.run_due_scripts(&sample, &estimates).request.as_ref(), &sample, &estimates);
+            gate.decide_override(host.run_due_scripts(&sample, &estimates).request.as_ref(), &sample, estimates.state);
         match verdict.outcome {
             GateOutcome::Held(_) => told[0] += 1,
             GateOutcome::Refused => told[1] += 1,

@@ -179,7 +179,7 @@ fn nothing_is_written_after_the_audit_has_gone_whatever_the_verdict_says() {
         let at_ns = tick * TICK_NS;
         clock.set_time(at_ns);
         let (sample, estimates) = cutting(at_ns);
-        let verdict = gate.decide_override(Some(&asking(60.0 + (tick % 30) as f64)), &sample, &estimates);
+        let verdict = gate.decide_override(Some(&asking(60.0 + (tick % 30) as f64)), &sample, estimates.state);
         assert!(verdict.armed, "the gate itself knows nothing of it");
         let written = writer.write_verdict(&verdict, &clock);
         let asks =

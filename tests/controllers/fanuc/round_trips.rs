@@ -15,7 +15,7 @@ fn median(mut times: Vec<Duration>) -> (Duration, Duration) {
 }
 
 fn polls(focas: &mut dyn Focas, count: usize) -> Vec<Duration> {
-    let items = [poll::list_fast_questions(1), poll::list_slow_questions(1)].concat();
+    let items = [poll::list_fast_questions(1), adapters::fanuc::list_slow_questions(1)].concat();
     let one = |_| {
         let (began, mut out) = (Instant::now(), Vec::new());
         focas.ask_questions(&items, &mut out).expect("answers");

@@ -29,7 +29,7 @@ fn models_come_back_and_the_newest_of_a_key_is_in_force() {
         store_wear_model(&path, at_ns, &record(tool, criterion_mm)).expect("stored while a gateway writes");
     }
     let reader = Reader::open(&path).expect("opens");
-    let found = reader.wear_models().expect("read");
+    let found = reader.wear_models::<WearRecord>().expect("read");
     assert_eq!(found.iter().map(|it| it.in_force).collect::<Vec<_>>(), [false, true, true]);
     assert_eq!((found[2].record.clone(), found[2].at_ns), (record("T1", 0.25), 3));
     assert_eq!(reader.newest_wear_model().expect("read"), 3);
@@ -56,7 +56,10 @@ fn an_older_file_is_read_as_it_is_and_gets_the_table_when_it_is_written() {
     let path = directory.path().join("h.db");
     older(&path);
     let reader = Reader::open(&path).expect("opens");
-    assert_eq!((reader.wear_models().expect("read"), reader.newest_wear_model().expect("read")), (Vec::new(), 0));
+    assert_eq!(
+        (reader.wear_models::<WearRecord>().expect("read"), reader.newest_wear_model().expect("read")),
+        (Vec::new(), 0)
+    );
     drop(reader);
     drop(Writer::open(&path, options()).expect("migrated"));
     let version: i64 = rusqlite::Connection::open(&path)
@@ -71,5 +74,5 @@ fn an_older_file_is_read_as_it_is_and_gets_the_table_when_it_is_written() {
         .expect("a plan");
     assert!(plan.contains("events_kind"), "events of a kind are found by their index: {plan}");
     store_wear_model(&path, 1, &record("T1", 0.3)).expect("stored");
-    assert_eq!(Reader::open(&path).expect("opens").wear_models().expect("read").len(), 1);
+    assert_eq!(Reader::open(&path).expect("opens").wear_models::<WearRecord>().expect("read").len(), 1);
 }

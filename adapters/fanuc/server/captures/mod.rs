@@ -20,7 +20,7 @@ use fanuc::generation::Generation;
 use fanuc::item::{FocasItem, Write};
 use fanuc::request;
 use fanuc::wire::{FocasFrame, FrameKind, Request, encode_frame, parse_replies, parse_requests, request_body};
-use rows::{CapturedCall, Says};
+use rows::{CapturedCall, CapturedMeaning};
 
 const VERSIONS: [u16; 3] = [2, 3, 4];
 
@@ -101,13 +101,15 @@ fn build_captured_frames(row: &CapturedCall, version: u16) -> (Vec<u8>, Vec<u8>)
 
 fn build_requests(row: &CapturedCall, generation: Generation) -> Vec<Request> {
     match &row.says {
-        Says::Written(write) => vec![request::build_write_request(write, generation)],
-        Says::Read(items, _) => items.iter().map(|item| request::build_read_request(*item, generation)).collect(),
+        CapturedMeaning::Written(write) => vec![request::build_write_request(write, generation)],
+        CapturedMeaning::Read(items, _) => {
+            items.iter().map(|item| request::build_read_request(*item, generation)).collect()
+        }
     }
 }
 
 fn list_rows(version: u16) -> impl Iterator<Item = CapturedCall> {
-    rows::list_all_calls().into_iter().filter(move |row| row.versions.contains(&version))
+    rows::list_calls().into_iter().chain(values::list_calls()).filter(move |row| row.versions.contains(&version))
 }
 
 #[test]
@@ -128,7 +130,7 @@ fn the_client_asks_as_the_vendors_client() {
 fn the_client_reads_the_same_values() {
     for version in VERSIONS {
         for row in list_rows(version) {
-            let Says::Read(items, expected) = &row.says else { continue };
+            let CapturedMeaning::Read(items, expected) = &row.says else { continue };
             let found =
                 decode_answers(items, Generation::from_version(version), &build_captured_frames(&row, version).1);
             assert_eq!(&found, expected, "{} of generation {version}", row.call);

@@ -5,7 +5,7 @@ use fanuc::code::FocasReturnCode;
 use fanuc::item::{Area, FocasItem, Position, Servo, Spindle, Stretch, Write};
 
 /// What the row is about.
-pub(super) enum Says {
+pub(super) enum CapturedMeaning {
     /// Items and their values.
     Read(Vec<FocasItem>, Vec<FocasItemResult>),
     Written(Write),
@@ -17,7 +17,7 @@ pub(super) struct CapturedCall {
     pub(super) versions: &'static [u16],
     pub(super) asked: &'static str,
     pub(super) answered: &'static str,
-    pub(super) says: Says,
+    pub(super) says: CapturedMeaning,
 }
 
 pub(super) const ALL: &[u16] = &[2, 3, 4];
@@ -32,11 +32,11 @@ pub(super) fn read(
     says: Vec<(FocasItem, FocasAnswer)>,
 ) -> CapturedCall {
     let (items, answers) = says.into_iter().map(|(item, answer)| (item, Ok(answer))).unzip();
-    CapturedCall { call, versions, asked, answered, says: Says::Read(items, answers) }
+    CapturedCall { call, versions, asked, answered, says: CapturedMeaning::Read(items, answers) }
 }
 
 pub(super) fn write(call: &'static str, versions: &'static [u16], asked: &'static str, write: Write) -> CapturedCall {
-    CapturedCall { call, versions, asked, answered: "", says: Says::Written(write) }
+    CapturedCall { call, versions, asked, answered: "", says: CapturedMeaning::Written(write) }
 }
 
 pub(super) fn define_refusal(
@@ -48,7 +48,7 @@ pub(super) fn define_refusal(
     detail: i16,
 ) -> CapturedCall {
     let refusal = Err(FocasItemError::Refused(Refusal { code: FocasReturnCode(code), detail }));
-    CapturedCall { call, versions: ALL, asked, answered, says: Says::Read(vec![item], vec![refusal]) }
+    CapturedCall { call, versions: ALL, asked, answered, says: CapturedMeaning::Read(vec![item], vec![refusal]) }
 }
 
 pub(super) fn build_number(value: f64) -> FocasAnswer {
@@ -82,14 +82,13 @@ pub(super) fn build_modal(value: i32) -> FocasAnswer {
     FocasAnswer::Modal { value, flag: 0, places: 0 }
 }
 
-/// Every captured call, in the order of the captures.
-pub(super) fn list_all_calls() -> Vec<CapturedCall> {
+/// The captured calls that stand here, in the order of the captures.
+pub(super) fn list_calls() -> Vec<CapturedCall> {
     let mut rows = list_state_calls();
     rows.extend(list_speed_calls());
     rows.extend(list_meter_calls());
     rows.extend(list_program_calls());
     rows.extend(list_dynamic_calls());
-    rows.extend(super::values::list_calls());
     rows
 }
 

@@ -86,11 +86,11 @@ pub(super) fn list_models(arguments: &LibraryArguments, as_json: bool) -> Comman
     Ok(CommandOutcome::Fine)
 }
 
-fn model_to_json(model: &StoredWearModel) -> serde_json::Value {
+fn model_to_json(model: &StoredWearModel<WearRecord>) -> serde_json::Value {
     json!({ "id": model.id, "at_ns": model.at_ns, "in_force": model.in_force, "record": model.record })
 }
 
-fn format_model(model: &StoredWearModel) -> String {
+fn format_model(model: &StoredWearModel<WearRecord>) -> String {
     let record = &model.record;
     let force = if model.in_force { "in force" } else { "replaced" };
     format!(

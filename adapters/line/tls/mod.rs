@@ -10,6 +10,7 @@ mod words;
 pub use line::{Lines, TcpConnection};
 pub use words::TlsError;
 
+use adapter_core::address::Keys;
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use rustls::{ClientConfig, RootCertStore};
@@ -32,6 +33,21 @@ pub struct TlsFiles {
 }
 
 impl TlsFiles {
+    /// The keys `ca`, `cert` and `key`, where the address is one of TLS; otherwise they are refused as unknown.
+    pub fn from_keys(keys: &mut Keys, secured: bool) -> Option<Self> {
+        if !secured {
+            return None;
+        }
+        let mut path = |key| keys.take_text(key).map(PathBuf::from);
+        let files = Self { ca: path("ca"), certificate: path("cert"), key: path("key") };
+        match (&files.certificate, &files.key) {
+            (Some(certificate), None) => keys.add_problem(describe_missing_file("cert", certificate, "key")),
+            (None, Some(key)) => keys.add_problem(describe_missing_file("key", key, "cert")),
+            _ => {}
+        }
+        Some(files)
+    }
+
     /// Reads the files.
     ///
     /// # Errors
@@ -91,4 +107,8 @@ fn load_certificates(file: &Path) -> Result<Vec<CertificateDer<'static>>, TlsErr
 
 fn private_key(file: &Path) -> Result<PrivateKeyDer<'static>, TlsError> {
     PrivateKeyDer::from_pem_file(file).map_err(|error| words::bad_file(file, "private key", &error))
+}
+
+fn describe_missing_file(given: &str, file: &Path, missing: &str) -> String {
+    format!("{given}={} needs {missing}=FILE beside it", file.display())
 }

@@ -5,8 +5,8 @@
 //! half of one, the line is kept quiet until the late answer has come or can hardly come any more: on a line without
 //! transaction numbers that is the only way not to take an old answer for a new one.
 
-use crate::address::{Parity, SerialTarget};
-use crate::integer::count_to_f64;
+use adapter_core::address::{Parity, SerialTarget};
+use adapter_core::integer::count_to_f64;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{FlockOperation, OFlags, flock};
 use rustix::termios::{ControlModes, OptionalActions, QueueSelector, tcflush, tcgetattr, tcsetattr};

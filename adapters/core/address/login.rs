@@ -1,8 +1,7 @@
-//! Keys that every address of a broker has: user, and the files of TLS.
+//! Keys by which an address says who signs in.
 
 use super::keys::Keys;
-use crate::tls::TlsFiles;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// User and password at a broker.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -36,23 +35,4 @@ impl Login {
         };
         Ok(Some((user.clone(), password.trim_end_matches(['\r', '\n']).to_owned())))
     }
-}
-
-/// The keys `ca`, `cert` and `key`, where the address is one of TLS; otherwise they are refused as unknown.
-pub fn tls_files(keys: &mut Keys, secured: bool) -> Option<TlsFiles> {
-    if !secured {
-        return None;
-    }
-    let mut path = |key| keys.take_text(key).map(PathBuf::from);
-    let files = TlsFiles { ca: path("ca"), certificate: path("cert"), key: path("key") };
-    match (&files.certificate, &files.key) {
-        (Some(certificate), None) => keys.add_problem(describe_missing_file("cert", certificate, "key")),
-        (None, Some(key)) => keys.add_problem(describe_missing_file("key", key, "cert")),
-        _ => {}
-    }
-    Some(files)
-}
-
-fn describe_missing_file(given: &str, file: &Path, missing: &str) -> String {
-    format!("{given}={} needs {missing}=FILE beside it", file.display())
 }

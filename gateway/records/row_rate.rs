@@ -38,6 +38,7 @@ impl RowRate {
             return None;
         }
         self.tokens -= 1.0;
+        debug_assert!((0.0..self.at_once.max(1.0)).contains(&self.tokens), "no more rows at once than allowed");
         Some(std::mem::take(&mut self.left_out))
     }
 

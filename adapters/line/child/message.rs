@@ -1,6 +1,6 @@
 //! Length and bytes, bounded.
 
-use crate::integer::widen_to_usize;
+use adapter_core::integer::widen_to_usize;
 use std::io::{Error, ErrorKind, Read, Result, Write};
 
 /// Longest request or answer.

@@ -280,7 +280,7 @@ impl Record {
 
 impl Record {
     /// Moves every time of it by so much.
-    pub(crate) fn shift_times(&mut self, by_ns: i64) {
+    pub fn shift_times(&mut self, by_ns: i64) {
         let move_ns = |at_ns: &mut TimeNs| *at_ns = at_ns.saturating_add(by_ns);
         match self {
             Self::Event(record) => move_ns(&mut record.at_ns),
