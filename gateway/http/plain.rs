@@ -15,6 +15,7 @@ use axum::routing::get;
 use gateway_base::moment;
 use gateway_status::{ChannelStatus, GateStatus, NumberOrWord, Status};
 use rules::physics::explain::Language;
+use rules::twin::text_report::space_unit;
 use serde::Deserialize;
 use std::fmt::Write;
 use std::time::Duration;
@@ -209,8 +210,7 @@ fn render_value(zh: bool, channel: &ChannelStatus) -> String {
     match (&channel.value, channel.missing) {
         (Some(NumberOrWord::Number(number)), _) => {
             let digits = usize::from(number.abs() < 100.0 && number.fract() != 0.0);
-            let unit = if channel.unit == "1" { "" } else { channel.unit };
-            escape_html(&format!("{number:.digits$} {unit}"))
+            escape_html(&format!("{number:.digits$}{}", space_unit(channel.unit)))
         }
         (Some(NumberOrWord::Text(text)), _) => escape_html(text),
         (None, missing) => {
