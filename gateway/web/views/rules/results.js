@@ -6,7 +6,7 @@ import { localTimes, t } from "/web/words.js";
 export function showTrials(view, found) {
   const lines = found.trials.map((r) =>
     row(
-      r.name,
+      make("code", "", r.name),
       r.problem ? t("trial_failed") : t("trial_passed"),
       r.problem ? `${t("line")} ${r.problem.line}: ${r.problem.what}` : t("trial_words", r.met, number(r.seconds, "s")),
       { dot: r.problem ? "bad" : "good", tone: r.problem ? "bad" : "" },
