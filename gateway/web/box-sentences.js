@@ -219,6 +219,11 @@ export const SENTENCES = [
   ["GET /api/v1/status lists the alarms that stand", "GET /api/v1/status 列出现有报警"],
   ["the alarm {0} was seen; it stands until its reason has gone", "报警 {0} 已确认；原因消除前保持"],
   ["no alarm {0} stands", "没有报警 {0}"],
+  ["alarm {0}", "报警 {0}"],
+  ["at the box", "在本机"],
+  ["it was not armed", "原本未允许写入"],
+  ["disarmed; the machine is given back to its dial", "已解除写入；机床交还操作面板"],
+  ["a feed hold or stop was seen to", "进给保持或停止已处理"],
   ["the next feed hold or stop may pass", "下一次进给保持或停止可以执行"],
   ["the box is busy; look at its log and try again", "网关繁忙；请查看日志后重试"],
   // The history and its questions.

@@ -39,7 +39,7 @@ const LOOK: &str = "((selector, gap) => [...document.querySelectorAll(selector)]
     const told = JSON.parse(box.dataset.unrecorded);
     const [a, b] = told.find(([a, b]) => a < gap && gap < b) ?? [NaN, NaN];
     const room = 0.25 * (b - a);
-    return { from, to, told, a, b, inside: a < b ? coloured(a + room, b - room) : null, before: coloured(a - 15, a), behind: coloured(b, b + 12) };
+    return { from, to, told, a, b, inside: a < b ? coloured(a + room, b - room) : null, before: a < b ? coloured(a - 15, a) : null, behind: a < b ? coloured(b, b + 12) : null };
 }))";
 
 /// When the history holds nothing, s since 1970: its middle.
