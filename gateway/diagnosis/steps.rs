@@ -1,8 +1,8 @@
 //! A plan as steps that a person can tick off: moves that differ in one commanded number alone are one step.
 
 use adapter_core::ChannelId;
+use adapter_core::channel::quantity::space_unit;
 use rules::twin::plan::{Move, Plan};
-use rules::twin::text_report::space_unit;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 

@@ -39,6 +39,14 @@ export const SENTENCES = [
   ["{0} has a new token", "{0} 已更换令牌"],
   ["{0} was removed", "{0} 已移除"],
   ["{0} was {1} and is {2}", "{0} 的角色由 {1} 改为 {2}"],
+  ["{0} was viewer", "{0} 原角色为查看"],
+  ["{0} was setter", "{0} 原角色为调机"],
+  ["{0} was armer", "{0} 原角色为允许写入"],
+  ["{0} was admin", "{0} 原角色为管理员"],
+  ["viewer from {0}", "查看，来自 {0}"],
+  ["setter from {0}", "调机，来自 {0}"],
+  ["armer from {0}", "允许写入，来自 {0}"],
+  ["admin from {0}", "管理员，来自 {0}"],
   ["{0} is viewer", "{0} 的角色为查看"],
   ["{0} is setter", "{0} 的角色为调机"],
   ["{0} is armer", "{0} 的角色为允许写入"],
@@ -132,6 +140,9 @@ export const SENTENCES = [
     "没有丢失；请查看当前值，如仍需要请重新设置",
   ],
   ["{0} stays as it is", "{0} 保持不变"],
+  ["{0} for tool {1}: {2} -> {3}", "{0}（刀具 {1}）：{2} -> {3}"],
+  ["{0} for operation {1}: {2} -> {3}", "{0}（工序 {1}）：{2} -> {3}"],
+  ["as the machine", "同本机床"],
   [
     "sent with every text of the editor; a backtest changes nothing and needs it not",
     "随编辑器内容发送；历史回放不更改任何内容",
@@ -316,11 +327,12 @@ const patterns = SENTENCES.map(([en, zh]) => [
   zh,
 ]);
 
-/** The Chinese of a whole sentence; nothing where it is none of these. What is filled in stays as it is. */
+/** The Chinese of a whole sentence; nothing where it is none of these. What is filled in stays as it is, unless it is one itself. */
 export function sentence(text) {
   for (const [pattern, places, zh] of patterns) {
     const found = pattern.exec(text);
-    if (found) return zh.replace(/\{(\d)\}/g, (_, at) => found[places.indexOf(Number(at)) + 1] ?? "");
+    const filled = (at) => found[places.indexOf(Number(at)) + 1] ?? "";
+    if (found) return zh.replace(/\{(\d)\}/g, (_, at) => sentence(filled(at)) ?? filled(at));
   }
   return null;
 }

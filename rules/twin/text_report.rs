@@ -3,6 +3,7 @@
 use super::diagnosis::{Alternative, Diagnosis, Fits, Missing, ParameterEstimate, Shift, Verdict};
 use super::plan::list_experiment_kinds;
 use super::region::Region;
+pub use adapter_core::channel::quantity::space_unit;
 use physics::explain::Language;
 use physics::find_effect;
 use std::fmt::Write as _;
@@ -51,12 +52,6 @@ pub fn format_short_number(x: f64) -> String {
     let decimals = (3.0 - magnitude).clamp(0.0, 7.0) as usize;
     let text = format!("{x:.decimals$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
-/// A unit as it stands behind a number in a sentence: a space and its symbol. A number without a unit (`1`) has none.
-#[must_use]
-pub fn space_unit(unit: &str) -> String {
-    if unit.is_empty() || unit == "1" { String::new() } else { format!(" {unit}") }
 }
 
 /// The same with a plus before a positive number.
