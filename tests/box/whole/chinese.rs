@@ -33,6 +33,46 @@ fn press(browser: &mut Browser, words: &str) {
     browser.value(&format!("{button}.click()"));
 }
 
+/// Changes and refusals of every kind, as the page asks for them; each refusal is shown in Chinese.
+fn work(browser: &mut Browser) {
+    for (method, path, body, status) in [
+        ("PUT", "/api/v1/settings", json!({ "script": "tool_wear", "name": "limit_parts", "value": 4 }), 200),
+        ("PUT", "/api/v1/rules/energy.rhai/draft", json!({ "text": "// 新", "digest": "" }), 409),
+        ("DELETE", "/api/v1/rules/energy.rhai/draft", json!({}), 0),
+        ("POST", "/api/v1/persons", json!({ "name": "王芳", "role": "viewer" }), 201),
+        ("DELETE", "/api/v1/persons/王芳", json!({}), 200),
+        ("POST", "/api/v1/doctor", json!({ "source": "nobody" }), 400),
+        ("POST", "/api/v1/diagnosis", json!({ "from": "-1h", "to": "now" }), 0),
+        ("DELETE", "/api/v1/diagnosis", json!({}), 0),
+        ("POST", "/api/v1/facts", json!({ "fact": "scrap", "parts": 1 }), 200),
+        ("POST", "/api/v1/gallery/axis", json!({}), 0),
+        ("POST", "/api/v1/disarm", json!({}), 0),
+        ("POST", "/api/v1/restart", json!({}), 409),
+    ] {
+        let (answered, told) = match method {
+            // Such a request has no body.
+            "DELETE" => {
+                let answer = browser.value(&format!(
+                    "fetch({}, {{ method: 'DELETE' }}).then(async (it) => [it.status, await it.json().catch(() => null)])",
+                    json!(path)
+                ));
+                (answer[0].as_u64().expect("a status"), answer[1].clone())
+            }
+            _ => ask(browser, method, path, &body),
+        };
+        assert!(status == 0 || answered == status, "{method} {path}: {answered} {told}");
+        // A refusal as the page would show it.
+        if answered >= 400 {
+            let shown = browser.value(&format!(
+                "import('/web/words.js').then(({{ box }}) => [{}, {}].map((it) => box(it)).join(' – '))",
+                told["title"], told["hint"]
+            ));
+            let shown = shown.as_str().expect("text");
+            assert!(shown.chars().any(|c| ('\u{4e00}'..='\u{9fff}').contains(&c)), "{method} {path}: {shown}");
+        }
+    }
+}
+
 #[test]
 fn whoever_works_in_chinese_meets_no_english_sentence() {
     if !browser::is_there() {
@@ -60,42 +100,7 @@ fn whoever_works_in_chinese_meets_no_english_sentence() {
     press(&mut browser, "运行试验");
     browser.wait_until("document.querySelector('main').innerText.includes('项试验全部通过')");
     check(&mut browser, "trials");
-    for (method, path, body, status) in [
-        ("PUT", "/api/v1/settings", json!({ "script": "tool_wear", "name": "limit_parts", "value": 4 }), 200),
-        ("PUT", "/api/v1/rules/energy.rhai/draft", json!({ "text": "// 新", "digest": "" }), 409),
-        ("DELETE", "/api/v1/rules/energy.rhai/draft", json!({}), 0),
-        ("POST", "/api/v1/persons", json!({ "name": "王芳", "role": "viewer" }), 201),
-        ("DELETE", "/api/v1/persons/王芳", json!({}), 200),
-        ("POST", "/api/v1/doctor", json!({ "source": "nobody" }), 400),
-        ("POST", "/api/v1/diagnosis", json!({ "from": "-1h", "to": "now" }), 0),
-        ("DELETE", "/api/v1/diagnosis", json!({}), 0),
-        ("POST", "/api/v1/facts", json!({ "fact": "scrap", "parts": 1 }), 200),
-        ("POST", "/api/v1/gallery/axis", json!({}), 0),
-        ("POST", "/api/v1/disarm", json!({}), 0),
-        ("POST", "/api/v1/restart", json!({}), 409),
-    ] {
-        let (answered, told) = match method {
-            // Such a request has no body.
-            "DELETE" => {
-                let answer = browser.value(&format!(
-                    "fetch({}, {{ method: 'DELETE' }}).then(async (it) => [it.status, await it.json().catch(() => null)])",
-                    json!(path)
-                ));
-                (answer[0].as_u64().expect("a status"), answer[1].clone())
-            }
-            _ => ask(&mut browser, method, path, &body),
-        };
-        assert!(status == 0 || answered == status, "{method} {path}: {answered} {told}");
-        // A refusal as the page would show it.
-        if answered >= 400 {
-            let shown = browser.value(&format!(
-                "import('/web/words.js').then(({{ box }}) => [{}, {}].map((it) => box(it)).join(' – '))",
-                told["title"], told["hint"]
-            ));
-            let shown = shown.as_str().expect("text");
-            assert!(shown.chars().any(|c| ('\u{4e00}'..='\u{9fff}').contains(&c)), "{method} {path}: {shown}");
-        }
-    }
+    work(&mut browser);
     open(&mut browser, &address, "audit", "document.querySelectorAll('main table tbody tr').length > 6");
     browser.value("(() => { const all = document.querySelector('main select'); all.value = 'all'; all.dispatchEvent(new Event('change')); })()");
     check(&mut browser, "audit");
