@@ -9,7 +9,7 @@ use crate::diagnosis::{Copies, read_model, read_recordings_as, simulation, unit_
 use clap::{Args, Subcommand};
 use rules::physics::explain::Language;
 use rules::twin::diagnosis::find_output_unit;
-use rules::twin::text_report::format_short_number;
+use rules::twin::text_report::{format_short_number, space_unit};
 use rules::twin::{self};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -130,10 +130,10 @@ fn check_model(path: &Path, recordings: &[String], map: Option<&PathBuf>) -> Com
     if let Ok(simulation) = simulation::run(&given.recording, &model, false)
         && let Some((rmse, rows)) = simulation.rmse()
     {
-        let (error, unit) = (format_short_number(rmse), find_output_unit(&model.output));
+        let (error, unit) = (format_short_number(rmse), space_unit(find_output_unit(&model.output)));
         print_text(pick_text(
-            &format!("the model as given misses {} by {error} {unit} over {rows} rows\n", model.output),
-            &format!("按给定模型，{}的误差为{error} {unit}（{rows}行）\n", model.output),
+            &format!("the model as given misses {} by {error}{unit} over {rows} rows\n", model.output),
+            &format!("按给定模型，{}的误差为{error}{unit}（{rows}行）\n", model.output),
         ));
     }
     let doubts = unit_check::find_input_doubts(&given.recording, &model);

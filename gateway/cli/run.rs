@@ -2,7 +2,7 @@
 
 use super::installation::note_data_dir;
 use super::{CannotRun, CommandOutcome, CommandResult, LogArguments};
-use crate::config;
+use crate::config::{self, OptionValue};
 use crate::demo;
 use crate::run::{self, RunPlan};
 use crate::sources::open::MachineSpeed;
@@ -57,17 +57,22 @@ pub(super) fn run(arguments: RunArguments, log: LogArguments) -> CommandResult {
 }
 
 fn build_plan(arguments: RunArguments) -> Result<RunPlan, CannotRun> {
-    let overrides = collect_overrides(&arguments);
+    let options = collect_options(&arguments);
     // A person at the command line is told at once. A service polls, stores and writes whatever the page cannot open, and tries again.
     let port_named = arguments.listen.is_some();
-    let own = |name: &str| overrides.iter().any(|(key, _)| key == name);
+    // A variable that an option goes before is not looked at: a wrong one does not matter.
+    let variable =
+        |given: &OptionValue| format!("{}{}__{}", config::ENVIRONMENT_PREFIX, given.section, given.key).to_uppercase();
+    let own = |name: &str| options.iter().any(|given| variable(given) == name);
     let environment =
         std::env::vars_os().filter_map(|(name, value)| Some((name.into_string().ok()?, value.into_string().ok()?)));
-    let environment: Vec<_> = environment.filter(|(name, _)| !own(name)).collect();
-    let variables = environment.into_iter().chain(overrides.clone());
+    let variables: Vec<_> = environment.filter(|(name, _)| !own(name)).collect();
     let config = match arguments.config.as_deref() {
-        Some(path) => config::load(Some(path), variables),
-        None => config::parse(config::BUILT_IN, &demo::config_text(arguments.speed), Path::new(""), variables),
+        Some(path) => config::load_with(Some(path), variables, &options),
+        None => {
+            let text = demo::config_text(arguments.speed);
+            config::parse_with(config::BUILT_IN, &text, Path::new(""), variables, &options)
+        }
     };
     let mut config = config.map_err(|problems| {
         let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
@@ -85,16 +90,17 @@ fn build_plan(arguments: RunArguments) -> Result<RunPlan, CannotRun> {
     })
 }
 
-/// RunArguments go before the environment and the file: they are given as variables in place of those of the environment.
-fn collect_overrides(arguments: &RunArguments) -> Vec<(String, String)> {
-    let mut overrides = Vec::new();
-    let mut set = |key: &str, value: String| overrides.push((format!("{}{key}", config::ENVIRONMENT_PREFIX), value));
-    if let Some(directory) = &arguments.data_dir {
+/// Options go before the environment and the file.
+fn collect_options(arguments: &RunArguments) -> Vec<OptionValue> {
+    let directory = arguments.data_dir.as_ref().map(|directory| {
         let absolute = std::path::absolute(directory).unwrap_or_else(|_| directory.clone());
-        set("GATEWAY__DATA_DIR", absolute.display().to_string());
-    }
-    if let Some(listen) = &arguments.listen {
-        set("HTTP__LISTEN", listen.to_string());
-    }
-    overrides
+        OptionValue { option: "--data-dir", section: "gateway", key: "data_dir", value: absolute.display().to_string() }
+    });
+    let listen = arguments.listen.map(|listen| OptionValue {
+        option: "--listen",
+        section: "http",
+        key: "listen",
+        value: listen.to_string(),
+    });
+    directory.into_iter().chain(listen).collect()
 }

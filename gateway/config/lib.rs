@@ -22,8 +22,9 @@ mod problem;
 mod read;
 mod stand_in;
 
-pub use in_force::InForce;
+pub use in_force::{InForce, ValueOrigin};
 pub use problem::Problem;
+pub use read::OptionValue;
 
 use adapters::{Address, Axis, ChannelId};
 use gateway_base::log::LogFormat;
@@ -252,13 +253,25 @@ pub fn load(
     file: Option<&Path>,
     environment: impl IntoIterator<Item = (String, String)>,
 ) -> Result<Config, Vec<Problem>> {
+    load_with(file, environment, &[])
+}
+
+/// The same with options of the command line, which go before the environment and the file.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with(
+    file: Option<&Path>,
+    environment: impl IntoIterator<Item = (String, String)>,
+    options: &[OptionValue],
+) -> Result<Config, Vec<Problem>> {
     let Some(path) = file else {
-        return parse(BUILT_IN, BUILT_IN_TEXT, Path::new(""), environment);
+        return parse_with(BUILT_IN, BUILT_IN_TEXT, Path::new(""), environment, options);
     };
     let name = path.display().to_string();
     let text = std::fs::read_to_string(path).map_err(|error| vec![unreadable_problem(&name, &error)])?;
     let base = path.parent().unwrap_or(Path::new(""));
-    parse(&name, &text, base, environment)
+    parse_with(&name, &text, base, environment, options)
 }
 
 fn unreadable_problem(name: &str, error: &std::io::Error) -> Problem {
@@ -280,6 +293,20 @@ pub fn parse(
     base: &Path,
     environment: impl IntoIterator<Item = (String, String)>,
 ) -> Result<Config, Vec<Problem>> {
+    parse_with(file, text, base, environment, &[])
+}
+
+/// The same with options of the command line, which go before the environment and the file.
+///
+/// # Errors
+/// As [`parse`].
+pub fn parse_with(
+    file: &str,
+    text: &str,
+    base: &Path,
+    environment: impl IntoIterator<Item = (String, String)>,
+    options: &[OptionValue],
+) -> Result<Config, Vec<Problem>> {
     let mut reading = read::ConfigInput::from_text(file, text);
     let mut variables: Vec<_> =
         environment.into_iter().filter(|(name, _)| name.starts_with(ENVIRONMENT_PREFIX)).collect();
@@ -287,6 +314,7 @@ pub fn parse(
     for (name, value) in &variables {
         reading.overlay_variable(name, ENVIRONMENT_PREFIX, value);
     }
+    options.iter().for_each(|given| reading.overlay_option(given));
     reading.complete_sections();
     let config = build::build_config(&mut reading, base);
     let mut problems = std::mem::take(&mut reading.problems);

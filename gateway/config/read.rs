@@ -16,8 +16,23 @@ pub(super) enum Origin {
     File(usize),
     /// The environment variable of this name.
     Variable(String),
+    /// The option of the command line with this name, such as `--listen`.
+    CommandLine(&'static str),
     /// Nowhere: the default of the table.
     Default,
+}
+
+/// A value that an option of the command line gives to a key.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OptionValue {
+    /// The option as it is typed, such as `--listen`.
+    pub option: &'static str,
+    /// Section of the key, without brackets.
+    pub section: &'static str,
+    /// Name of the key.
+    pub key: &'static str,
+    /// What was typed behind it.
+    pub value: String,
 }
 
 /// A checked value and where it was written.
@@ -102,6 +117,7 @@ impl<'a> ConfigInput<'a> {
         let problem = match origin {
             Origin::File(offset) => Problem::in_file(self.file, what, next).with_position(self.text, *offset),
             Origin::Variable(name) => Problem::in_file(name.clone(), what, next),
+            Origin::CommandLine(option) => Problem::in_file(*option, what, next),
             Origin::Default => Problem::in_file(self.file, what, next),
         };
         self.problems.push(problem);
@@ -210,6 +226,25 @@ impl<'a> ConfigInput<'a> {
             }
         }
         values
+    }
+
+    /// Overlays an option of the command line, which goes before everything else.
+    pub(super) fn overlay_option(&mut self, given: &OptionValue) {
+        let origin = Origin::CommandLine(given.option);
+        let (Some(section), Some(key)) = (find_section(given.section), find_key(given.section, given.key)) else {
+            return self.add_problem(&origin, "this option names no key", "");
+        };
+        match check_scalar(key, &given.value) {
+            Ok(value) => {
+                drop(self.section_values_mut(section, None).found.insert(key.name, LocatedValue { value, origin }))
+            }
+            Err((what, next)) => self.add_problem(&origin, what, next),
+        }
+    }
+
+    /// Is this the configuration that comes with the program?
+    pub(super) fn is_built_in(&self) -> bool {
+        self.file == super::BUILT_IN
     }
 
     /// Overlays an environment variable whose name begins with the prefix.

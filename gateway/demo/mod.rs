@@ -71,6 +71,14 @@ pub fn install_data(config: &mut Config, speed: MachineSpeed) {
             config.twin.model = Some(data_dir.join("demo-lathe.toml"));
             config.operations.path.get_or_insert(data_dir.join(RECIPE_FILE));
             config.thermal.model.get_or_insert(data_dir.join(THERMAL_FILE));
+            let set = [
+                ("[twin] model", config.twin.model.clone()),
+                ("[operations] path", config.operations.path.clone()),
+                ("[thermal] model", config.thermal.model.clone()),
+            ];
+            for (key, path) in set {
+                path.into_iter().for_each(|path| config.note_built_in(key, &path));
+            }
         }
         Err(error) => {
             let text = format!("the demonstration runs without its models: {error}");

@@ -10,7 +10,7 @@ use adapter_core::ChannelId;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use recording::Recording;
 use rules::twin::live::{Regime, regime, second_row::Row};
-use rules::twin::text_report::format_short_number;
+use rules::twin::text_report::{format_short_number, space_unit};
 use rules::twin::{Diagnosis, Model};
 use serde::{Deserialize, Serialize};
 
@@ -187,7 +187,7 @@ impl BesideModel {
     /// How far the machine is from the model in charge, English and Chinese.
     fn difference_words(&self, unit: &str) -> (String, String) {
         let (en_where, zh_where) = self.regime.as_phrases();
-        let amount = format!("{} {unit}", format_short_number(self.difference.abs()));
+        let amount = format_short_number(self.difference.abs()) + space_unit(unit).as_str();
         // A share of nothing is no figure.
         let share = (self.expected.abs() > self.negligible_difference())
             .then(|| format_short_number(100.0 * self.difference.abs() / self.expected.abs()));
@@ -225,13 +225,14 @@ pub fn compose_headline(beside: &[BesideModel], unit: &str, (en, zh): (&str, &st
 
 fn describe_model(one: &BesideModel, unit: &str, moved: &[MovedParameter]) -> (String, String) {
     let (en_where, zh_where) = one.regime.as_phrases();
+    let amount_unit = space_unit(unit);
     if !one.has_difference() {
         return (
             format!(
-                "{en_where} the machine takes what the model in charge says ({:+} {unit})",
+                "{en_where} the machine takes what the model in charge says ({:+}{amount_unit})",
                 round_for_display(one.difference)
             ),
-            format!("{zh_where}与当前模型一致（{:+} {unit}）", round_for_display(one.difference)),
+            format!("{zh_where}与当前模型一致（{:+}{amount_unit}）", round_for_display(one.difference)),
         );
     }
     let mut en: Vec<String> = Vec::new();
@@ -239,23 +240,24 @@ fn describe_model(one: &BesideModel, unit: &str, moved: &[MovedParameter]) -> (S
     let told = |value: f64| value.abs() > 0.05 * one.difference.abs();
     if told(one.by_parameters) {
         let of = |it: &MovedParameter| {
-            format!("{} {} → {} {}", it.name, format_short_number(it.before), format_short_number(it.after), it.unit)
+            let (before, after) = (format_short_number(it.before), format_short_number(it.after));
+            format!("{} {before} → {after}{}", it.name, space_unit(&it.unit))
         };
         let names: Vec<String> = moved.iter().take(NAMED_MAX).map(of).collect();
         let names = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
         en.push(format!(
-            "{:+} {unit} because parameters of the model are other ones now{names}",
+            "{:+}{amount_unit} because parameters of the model are other ones now{names}",
             round_for_display(one.by_parameters)
         ));
-        zh.push(format!("模型参数变化{:+} {unit}{names}", round_for_display(one.by_parameters)));
+        zh.push(format!("模型参数变化{:+}{amount_unit}{names}", round_for_display(one.by_parameters)));
     }
     for (kind, share) in one.by_effects.iter().filter(|(_, share)| told(*share)) {
-        en.push(format!("{:+} {unit} by {kind}", round_for_display(*share)));
-        zh.push(format!("{kind} {:+} {unit}", round_for_display(*share)));
+        en.push(format!("{:+}{amount_unit} by {kind}", round_for_display(*share)));
+        zh.push(format!("{kind} {:+}{amount_unit}", round_for_display(*share)));
     }
     if told(one.left) || en.is_empty() {
-        en.push(format!("{:+} {unit} by nothing that was found", round_for_display(one.left)));
-        zh.push(format!("未找到原因{:+} {unit}", round_for_display(one.left)));
+        en.push(format!("{:+}{amount_unit} by nothing that was found", round_for_display(one.left)));
+        zh.push(format!("未找到原因{:+}{amount_unit}", round_for_display(one.left)));
     }
     let (en_difference, zh_difference) = one.difference_words(unit);
     (format!("{en_difference}: {}", en.join(", ")), format!("{zh_difference}：{}", zh.join("，")))
@@ -298,6 +300,38 @@ mod tests {
         );
         let standby = one(Regime::Standby, 0.0, -120.0);
         assert!(standby.has_difference() && !standby.en.contains('%') && !standby.zh.contains('%'), "{}", standby.en);
+    }
+
+    #[test]
+    fn no_sentence_carries_the_unit_of_what_has_none() {
+        let parameter = |unit: &str| MovedParameter {
+            name: "speed_table.p0".to_owned(),
+            before: 1.0,
+            after: 1.3,
+            unit: unit.to_owned(),
+        };
+        for expected in [0.0, 1772.0] {
+            for difference in [0.3, 251.0, -251.0] {
+                let mut of = one(Regime::Cutting, expected, difference);
+                of.by_parameters = difference;
+                let (en, zh) = describe_model(&of, "1", &[parameter("1"), parameter("W")]);
+                let (first, first_zh) = compose_headline(&[of], "1", ("It agrees.", "一致。"));
+                for text in [en, zh, first, first_zh] {
+                    let parts: Vec<&str> = text.split(' ').collect();
+                    let is_one = |part: &str| part.trim_matches(|c: char| !c.is_ascii_digit() && c != '.') == "1";
+                    let is_number = |part: &str| part.trim_start_matches(['(', '+']).parse::<f64>().is_ok();
+                    let ones = parts.windows(2).filter(|pair| is_number(pair[0]) && is_one(pair[1]));
+                    assert_eq!(ones.count(), 0, "{text}");
+                    assert!(!text.contains("  ") && !text.contains(" )"), "{text}");
+                }
+            }
+        }
+        let told = describe_model(
+            &BesideModel { by_parameters: 251.0, ..one(Regime::Cutting, 1772.0, 251.0) },
+            "W",
+            &[parameter("1")],
+        );
+        assert!(told.0.contains("speed_table.p0 1 → 1.3)") && told.0.contains("+251 W"), "{}", told.0);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use super::unit_check::{self, UnitDoubt};
 use adapter_core::bilingual::Bilingual;
 use recording::Recording;
 use rules::physics::explain::Language;
-use rules::twin::text_report::format_short_number;
+use rules::twin::text_report::{format_short_number, space_unit};
 use rules::twin::{Diagnosis, Model};
 use serde_json::{Value, json};
 
@@ -97,11 +97,12 @@ impl SeriesErrors {
     pub fn describe_errors(&self, unit: &str) -> Bilingual {
         let [given, fitted, gain, offset] =
             [self.as_given, self.refitted, self.gain, self.offset].map(format_short_number);
+        let unit = space_unit(unit);
         Bilingual::new(
             format!(
-                "your simulation as given misses the recording by {given} {unit}; times {gain} plus {offset} {unit} it misses by {fitted} {unit}"
+                "your simulation as given misses the recording by {given}{unit}; times {gain} plus {offset}{unit} it misses by {fitted}{unit}"
             ),
-            format!("给定的仿真与记录相差{given} {unit}；乘以{gain}再加{offset} {unit}后相差{fitted} {unit}"),
+            format!("给定的仿真与记录相差{given}{unit}；乘以{gain}再加{offset}{unit}后相差{fitted}{unit}"),
         )
     }
 }

@@ -4,7 +4,7 @@ use recording::Recording;
 use rules::twin::Model;
 use rules::twin::diagnosis::find_output_unit;
 use rules::twin::simulate::{FormDoubt, SimulatedRows, simulate_recording};
-use rules::twin::text_report::format_short_number;
+use rules::twin::text_report::{format_short_number, space_unit};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
@@ -63,13 +63,13 @@ impl Simulation {
     /// Lines for the reader: total, then mean and range of each part, in the unit of the output.
     #[must_use]
     pub fn format_text(&self) -> String {
-        let unit = find_output_unit(&self.output);
+        let unit = space_unit(find_output_unit(&self.output));
         let rows = self.total.iter().flatten().count();
         let mut text = format!("{}: {} simulated in {rows} of {} rows\n", self.name, self.output, self.total.len());
         for (label, mean, low, high) in self.part_summaries() {
             let _ = writeln!(
                 text,
-                "  {label}: mean {}, {} to {} {unit}",
+                "  {label}: mean {}, {} to {}{unit}",
                 format_short_number(mean),
                 format_short_number(low),
                 format_short_number(high)
@@ -79,14 +79,14 @@ impl Simulation {
             let (power, half) = (format_short_number(doubt.power), format_short_number(HALF_INTERVAL * doubt.sd));
             let _ = writeln!(
                 text,
-                "  {label}: between known speeds it is in doubt, at {:.0} rpm {power} +- {half} {unit}; idle there to know it",
+                "  {label}: between known speeds it is in doubt, at {:.0} rpm {power} +- {half}{unit}; idle there to know it",
                 doubt.speed_rpm
             );
         }
         match self.rmse() {
             Some((rmse, rows)) => {
                 let _ =
-                    writeln!(text, "rmse against the recording: {} {unit} over {rows} rows", format_short_number(rmse));
+                    writeln!(text, "rmse against the recording: {}{unit} over {rows} rows", format_short_number(rmse));
             }
             None => text.push_str("the output is not recorded, so there is nothing to compare it with\n"),
         }

@@ -1,6 +1,7 @@
 //! A plan as steps that a person can tick off: moves that differ in one commanded number alone are one step.
 
 use adapter_core::ChannelId;
+use adapter_core::channel::quantity::space_unit;
 use rules::twin::plan::{Move, Plan};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
@@ -61,9 +62,9 @@ fn describe_step(group: &[&Move], repeated: bool) -> DiagnosisStep {
         }
         let channel = ChannelId::from_name(name).map(|id| id.channel());
         let (label, label_zh, unit) = channel.map_or((name.as_str(), name.as_str(), ""), |it| (it.en, it.zh, it.unit));
-        let levels = format_levels(group, name);
-        let _ = write!(en, "; {} {levels} {unit}", label.to_lowercase());
-        let _ = write!(zh, "；{label_zh} {levels} {unit}");
+        let (levels, unit) = (format_levels(group, name), space_unit(unit));
+        let _ = write!(en, "; {} {levels}{unit}", label.to_lowercase());
+        let _ = write!(zh, "；{label_zh} {levels}{unit}");
     }
     for (column, word) in &first.words {
         let _ = write!(en, "; {column}: {word}");

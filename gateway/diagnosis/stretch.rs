@@ -9,6 +9,10 @@ use recording::{Cells, Numbers, Words};
 use std::ops::Range;
 use std::path::Path;
 
+/// So much of the machine as it is now makes a diagnosis that can be relied upon, s. The box begins none of its own with less, and the page
+/// warns a person who asks for one: with few cuts of each kind the error on rows that were left out says little, and the answer is more
+/// often "cannot tell".
+pub const ENOUGH_S: i64 = 45 * 60;
 /// Rows of a stretch; the beginning of a longer one is left out.
 const ROWS_MAX: usize = 28_800;
 /// Seconds of the same work before and after a row that counts.

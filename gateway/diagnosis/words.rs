@@ -2,7 +2,7 @@
 
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use rules::twin::live::{LevelChange, Mismatch, Regime};
-use rules::twin::text_report::format_short_number;
+use rules::twin::text_report::{format_short_number, space_unit};
 
 /// A time in seconds since 1970 as nanoseconds.
 #[must_use]
@@ -29,7 +29,7 @@ pub fn mismatch_since(found: &Mismatch, quantity: (&str, &str), unit: &str) -> (
 /// A difference for the operator, English and Chinese, without a time: who shows it has the clock of the reader.
 #[must_use]
 pub fn describe_mismatch(found: &Mismatch, quantity: (&str, &str), unit: &str) -> (String, String) {
-    let size = format!("{} {unit}", format_short_number(found.mean.abs()));
+    let size = format_short_number(found.mean.abs()) + space_unit(unit).as_str();
     let percent = found
         .difference_percent()
         .map_or(String::new(), |percent| format!(" ({} %)", format_short_number(percent.abs())));

@@ -19,6 +19,7 @@ use axum::routing::{delete, get, post};
 use gateway_access::Role;
 use gateway_diagnosis::handle::{DiagnosisHandle, DiagnosisRefusal, Run};
 use gateway_diagnosis::store::{DiagnosisFile, DiagnosisStore, is_key};
+use gateway_diagnosis::stretch::ENOUGH_S;
 use rules::physics::explain::Language;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -65,9 +66,11 @@ pub(super) fn describe_diagnosis_refusal(refusal: DiagnosisRefusal) -> ApiProble
     ApiProblem::conflict(refusal.what, refusal.next)
 }
 
-/// `GET /api/v1/diagnosis`: the diagnosis under way, or how the last one ended.
+/// `GET /api/v1/diagnosis`: the diagnosis under way, or how the last one ended; and how much history is enough for one.
 async fn serve_diagnosis(State(shared): State<ServerState>) -> Json<Value> {
-    Json(run_document(shared.diagnoses.as_ref().map(DiagnosisHandle::current_run).unwrap_or_default()))
+    let mut told = run_document(shared.diagnoses.as_ref().map(DiagnosisHandle::current_run).unwrap_or_default());
+    told["enough_s"] = json!(ENOUGH_S);
+    Json(told)
 }
 
 /// What is being done, and about how long it takes in all.

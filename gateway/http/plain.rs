@@ -8,6 +8,7 @@ use super::problem::ApiProblem;
 use super::route::Route;
 use super::vocabulary;
 use adapters::ChannelId;
+use adapters::channel::quantity::space_unit;
 use axum::extract::{Extension, Query, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -209,8 +210,7 @@ fn render_value(zh: bool, channel: &ChannelStatus) -> String {
     match (&channel.value, channel.missing) {
         (Some(NumberOrWord::Number(number)), _) => {
             let digits = usize::from(number.abs() < 100.0 && number.fract() != 0.0);
-            let unit = if channel.unit == "1" { "" } else { channel.unit };
-            escape_html(&format!("{number:.digits$} {unit}"))
+            escape_html(&format!("{number:.digits$}{}", space_unit(channel.unit)))
         }
         (Some(NumberOrWord::Text(text)), _) => escape_html(text),
         (None, missing) => {

@@ -7,6 +7,7 @@
 //! Two persons may change one setting: each change names the value that it began from, and who comes second is told ([`Refused`]).
 
 use crate::reload::compute_digest;
+use adapter_core::channel::quantity::space_unit;
 use gateway_base::files::{read_text, replace_file};
 use gateway_history::Event;
 use rules::script::{
@@ -174,7 +175,7 @@ impl SettingChange {
     pub fn describe_change(&self) -> String {
         let Self { path, place, unit, before, after } = self;
         let place = if *place == DeclarationPlace::Machine { String::new() } else { format!(" for {place}") };
-        format!("{path}{place}: {before} -> {after} {unit}").trim_end().to_owned()
+        format!("{path}{place}: {before} -> {after}{}", space_unit(unit))
     }
 
     /// The detail of its event.
@@ -292,6 +293,20 @@ mod tests {
 
     const SCRIPT: &str = "const X = setting(\"x_w\", 5.0, #{ unit: \"W\", min: 0, max: 10, per: [\"tool\"], en: \"a\", zh: \"b\" });\n\
         alarm_when(\"over\", (cutting_power_w ?? 0.0) > X, 0.0, \"over\");";
+
+    #[test]
+    fn a_change_of_a_pure_number_carries_no_one() {
+        let change = |unit: &str| SettingChange {
+            path: "tool_wear.limit_parts".to_owned(),
+            place: DeclarationPlace::Machine,
+            unit: unit.to_owned(),
+            before: "3.0".to_owned(),
+            after: "4.0".to_owned(),
+        };
+        assert_eq!(change("1").describe_change(), "tool_wear.limit_parts: 3.0 -> 4.0");
+        assert_eq!(change("").describe_change(), "tool_wear.limit_parts: 3.0 -> 4.0");
+        assert_eq!(change("W").describe_change(), "tool_wear.limit_parts: 3.0 -> 4.0 W");
+    }
 
     #[test]
     fn a_setting_is_tried_written_and_told_with_its_author() {

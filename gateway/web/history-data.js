@@ -54,7 +54,7 @@ export class HistoryData {
         ? ask(`/api/v1/samples?${range}&channels=${channels.join(",")}&resolution_s=${resolution}`, options)
         : Promise.resolve({ series: [] });
       const charts = asked.then((samples) => {
-        if (turn === this.turn) early({ series: samples.series, resolution });
+        if (turn === this.turn) early({ series: samples.series, resolution, range: [a, b] });
         return samples;
       });
       const [samples, states, shares, parts, alarms, audit] = await Promise.all([

@@ -1,10 +1,12 @@
 // Small pieces that every view is made of.
+import { box } from "./words.js";
+
 export function make(tag, className, content, attributes = {}) {
   const element = document.createElement(tag);
   if (className) element.className = className;
   if (content instanceof Node) element.append(content);
   else if (Array.isArray(content)) element.append(...content.filter((it) => it !== null && it !== undefined));
-  else if (content !== undefined && content !== null) element.textContent = content;
+  else if (content !== undefined && content !== null) write(element, String(content));
   for (const [name, value] of Object.entries(attributes)) {
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
     else if (value !== null && value !== undefined && value !== false)
@@ -13,9 +15,20 @@ export function make(tag, className, content, attributes = {}) {
   return element;
 }
 
+/** Elements whose text is what it is. */
+const VERBATIM = new Set(["CODE", "PRE", "OPTION", "TEXTAREA"]);
+
+/** Writes a text: what stands between two backticks is to be typed as it is, or is a name of the box. */
+function write(element, text) {
+  const pieces = text.split("`");
+  if (pieces.length % 2 === 0 || pieces.length === 1 || VERBATIM.has(element.tagName)) element.textContent = text;
+  else element.replaceChildren(...pieces.map((piece, at) => (at % 2 ? make("code", "", piece) : piece)));
+}
+
 /** Sets a text only where it has changed, so that nothing is laid out again for nothing. */
 export function say(element, text) {
-  if (element.textContent !== text) element.textContent = text;
+  const wanted = String(text ?? "");
+  if (element.textContent !== wanted && element.textContent !== wanted.replaceAll("`", "")) write(element, wanted);
 }
 
 export function card(title, content, className = "") {
@@ -46,12 +59,30 @@ function cellClass(it) {
   return String(text ?? "").length > WORDS_FROM ? "words" : "";
 }
 
+/** For a table that stands as text: each cell knows the name of its column. */
+export function labelCells(table) {
+  const names = [...table.querySelectorAll("thead th")].map((it) => it.textContent);
+  for (const line of table.querySelectorAll("tbody tr"))
+    [...line.cells].forEach((it, at) => it.setAttribute("data-label", names[at] ?? ""));
+}
+
 export function table(head, rows, { caption } = {}) {
   const box = make("div", "scroll", null, { tabindex: "0", role: "region", "aria-label": caption });
-  const cell = (tag) => (it) =>
-    make(tag, cellClass(it), it?.num ?? it?.text ?? it, tag === "th" ? { scope: "col" } : {});
-  const body = rows.map((cells) => make("tr", "", cells.map(cell("td"))));
-  box.append(make("table", "", [make("thead", "", make("tr", "", head.map(cell("th")))), make("tbody", "", body)]));
+  const words = (it) => it?.num ?? it?.text ?? it;
+  const named = head.map((it) => make("th", cellClass(it), words(it), { scope: "col", role: "columnheader" }));
+  // On a narrow screen each cell stands behind the name of its column. The roles hold where the table is drawn as blocks.
+  const cell = (it, at) =>
+    make("td", cellClass(it), words(it), { "data-label": String(words(head[at]) ?? ""), role: "cell" });
+  const line = (cells) => make("tr", "", cells, { role: "row" });
+  const body = rows.map((cells) => line(cells.map(cell)));
+  box.append(
+    make(
+      "table",
+      "",
+      [make("thead", "", line(named), { role: "rowgroup" }), make("tbody", "", body, { role: "rowgroup" })],
+      { role: "table" },
+    ),
+  );
   return box;
 }
 
@@ -66,7 +97,10 @@ function understand(status, text, otherwise) {
   // A session that is over: the frame asks who is signed in now.
   if (status === 401) dispatchEvent(new Event("signed-out"));
   if (status < 200 || status > 299)
-    throw Object.assign(new Error([document.title, document.hint].filter(Boolean).join(" – ")), { status, document });
+    throw Object.assign(new Error([document.title, document.hint].filter(Boolean).map(box).join(" – ")), {
+      status,
+      document,
+    });
   return document;
 }
 

@@ -3,6 +3,7 @@
 // gap.
 import uPlot from "/web/uplot.js";
 import { colour, make } from "./parts.js";
+import { breakAtGaps, findGaps, hatch, unrecorded } from "./gaps.js";
 import { clock, clockMinute, dayShort, number, unitName } from "./format.js";
 
 /** Width of the value axis: the same everywhere, so that charts and ribbons stand exactly above each other. */
@@ -119,7 +120,7 @@ export class TimePlot {
         ],
         series: [{}, ...lines],
         bands,
-        hooks: { setCursor: [(u) => this.onCursor?.(u.cursor.idx)], draw: [(u) => this.overlay?.(u)] },
+        hooks: { setCursor: [(u) => this.onCursor?.(u.cursor.idx)], drawClear: [(u) => this.hatchUnrecorded(u)] },
       },
       this.data ?? [[]].concat(lines.map(() => [])),
       this.box,
@@ -130,16 +131,31 @@ export class TimePlot {
     if (this.range) this.show(...this.range);
   }
 
-  /** Columns: x in seconds, then mean, least and greatest of every series. */
-  give(data) {
-    this.data = data;
-    this.u.setData(data, false);
+  /** Columns: x in seconds, then mean, least and greatest of every series. Each row stands for `width` seconds, of `from` to
+      `to` everything is there that was recorded, and waits of up to `least` seconds are none. */
+  give(data, { from, to, width = 0, least = 1 }) {
+    const gaps = findGaps(data[0], Math.max(least, 1.5 * width));
+    this.data = breakAtGaps(data, gaps);
+    this.unrecorded = unrecorded(data[0], gaps, { from, to, width });
+    this.box.dataset.unrecorded = JSON.stringify(this.unrecorded);
+    this.u.setData(this.data, false);
     if (this.range) this.show(...this.range);
+  }
+
+  /** The line is broken there; that nothing was recorded is said. */
+  hatchUnrecorded(u) {
+    const ratio = devicePixelRatio || 1;
+    const place = (s) => Math.min(u.bbox.left + u.bbox.width, Math.max(u.bbox.left, u.valToPos(s, "x", true)));
+    for (const [from, to] of this.unrecorded ?? []) {
+      const [left, right] = [place(from), place(to)];
+      hatch(u.ctx, [left, u.bbox.top, right - left, u.bbox.height], ratio);
+    }
   }
 
   /** The time that is looked at, in seconds. */
   show(from, to) {
     this.range = [from, to];
+    Object.assign(this.box.dataset, { from, to });
     this.u.batch(() => this.u.setScale("x", { min: from, max: to }));
   }
 
@@ -152,13 +168,6 @@ export class TimePlot {
     this.u.destroy();
     this.box.remove();
   }
-}
-
-/** From where a chart of this time is to be drawn: where the data begins, if that is later, so that a young history
-    fills its chart and is no line at the right edge. At least a minute is shown. */
-export function drawnFrom(data, from, to) {
-  const first = data[0].find((_, at) => data.some((column, of) => of > 0 && typeof column[at] === "number"));
-  return first === undefined ? from : Math.max(from, Math.min(first, to - 60));
 }
 
 /** A little room above and below; zero in sight where it is near. */

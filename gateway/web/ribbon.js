@@ -1,5 +1,6 @@
 // The machine's states as a coloured band, exactly above the charts. Zoomed far out, shares of time per hour or day.
 import { AXIS_PX, RIGHT_PX } from "./plot.js";
+import { hatch } from "./gaps.js";
 import { colour, make } from "./parts.js";
 import { duration } from "./format.js";
 
@@ -19,9 +20,10 @@ export class StateRibbon {
     this.observer.observe(root);
   }
 
-  /** Spans: [{from, to, word}] in seconds; shares: [{from, to, seconds: {word: s}}]; marks: [{at, line, label}]. */
-  show(from, to, spans = [], { shares = [], marks = [], parts = [] } = {}) {
-    Object.assign(this, { from, to, spans, shares, marks, parts });
+  /** Spans: [{from, to, word}] in seconds; shares: [{from, to, seconds: {word: s}}]; marks: [{at, tone}]; unrecorded: [[from, to]].
+   */
+  show(from, to, spans = [], { shares = [], marks = [], parts = [], unrecorded = [] } = {}) {
+    Object.assign(this, { from, to, spans, shares, marks, parts, unrecorded });
     this.draw();
   }
 
@@ -43,6 +45,10 @@ export class StateRibbon {
     pen.clearRect(0, 0, this.width, this.height);
     pen.fillStyle = colour("grid");
     pen.fillRect(AXIS_PX, 2, this.width - AXIS_PX - RIGHT_PX, this.height - 4);
+    for (const gap of this.unrecorded) {
+      const [left, right] = this.clipped(...gap);
+      hatch(pen, [left, 2, right - left, this.height - 4]);
+    }
     if (this.shares.length) this.drawShares(pen);
     else this.drawSpans(pen);
     this.drawMarks(pen);

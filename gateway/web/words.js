@@ -1,6 +1,7 @@
 // The words of the page in the language of the reader. Names of channels, states and reasons come from the box itself.
 import { WORDS } from "./word-table.js";
 import { PHRASES } from "./box-texts.js";
+import { sentence } from "./box-sentences.js";
 
 const asked = new URLSearchParams(location.search).get("lang");
 const stored = () => {
@@ -47,10 +48,21 @@ export const localTimes = (text) =>
 /** The text of something that carries `en` and `zh` itself. */
 export const own = (thing) => localTimes(thing?.[chosen] ?? thing?.en ?? "");
 
-/** What the box says in English, in Chinese where that is read: the sentences of the gate are put together from known
-    phrases. */
+/** A change in the audit: the request, its answer, and what was done. */
+const CHANGE = /^([A-Z]+ \/\S+(?: from \S+)?(?: \(\d+\))?): (.+)$/s;
+
+/** What the box says in English, in Chinese where that is read: a whole sentence, or one of the gate, which is put together from
+    known phrases. */
 export function box(text) {
   if (chosen !== "zh" || !text) return localTimes(text);
+  const [, request, words] = CHANGE.exec(text) ?? [];
+  if (request) return `${request}：${box(words)}`;
+  const whole = sentence(text);
+  if (whole) return localTimes(whole);
+  if (text.includes("; ")) {
+    const parts = text.split("; ");
+    if (parts.every((part) => sentence(part))) return localTimes(parts.map(sentence).join("；"));
+  }
   const ranges = localTimes(text).replace(/(\d) to (-?\d)/g, "$1 至 $2");
   return PHRASES.reduce((done, [en, zh]) => done.split(en).join(zh), ranges);
 }

@@ -5,6 +5,7 @@ use super::no_load::NoLoadPoint;
 use super::place_settings::PlaceValues;
 use super::stage_settings::{OF_STAGE, find_place_of_stage, split_stage_suffix};
 use adapter_core::channel::find_nearest_name;
+use adapter_core::channel::quantity::space_unit;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use thiserror::Error;
@@ -46,7 +47,7 @@ pub enum SettingError {
         nearest: Option<&'static str>,
     },
     /// Outside the range, or not a whole number where one is needed.
-    #[error("{name} = {value} {unit} is outside {least} to {greatest} {unit}{}", if *.whole { " or not a whole number" } else { "" })]
+    #[error("{name} = {value}{0} is outside {least} to {greatest}{0}{1}", space_unit(.unit), if *.whole { " or not a whole number" } else { "" })]
     Range {
         /// Name of the setting, as given.
         name: String,

@@ -72,7 +72,7 @@ pub(super) const QUANTITIES: [QuantityRow; 11] = [
         "tool_worn_probability_sd",
         "1",
         "Probability that the edge in use passes its criterion by the end of the next part",
-        "当前刀刃在下一件结束前超过磨损标准的概率",
+        "当前刀刃在下一件结束前超过磨钝标准的概率",
         |it| it.tool_worn_probability,
     ),
     (

@@ -50,7 +50,7 @@ pub(super) fn read_choices(
             let Some(chosen) = chosen else { return Ok(None) };
             let (line, column, place) = (at.line(), at.position(), place.clone());
             let choice = ChosenSetting { name: name.to_string(), value: chosen, place, line, column };
-            apply_choice(&choice, &mut trial).map_err(|error| describe_error(&error))?;
+            apply_choice(&choice, &mut trial).map_err(|error| error.to_string())?;
             Ok(Some(choice))
         });
         match read {
@@ -60,16 +60,6 @@ pub(super) fn read_choices(
     }
     problems.sort_by_key(|problem| (problem.line, problem.column));
     if problems.is_empty() { Ok(choices) } else { Err(problems) }
-}
-
-/// The message of the estimators, without the unit of a pure number.
-fn describe_error(error: &SettingError) -> String {
-    match error {
-        SettingError::Range { name, value, unit: "1", least, greatest, whole: false } => {
-            format!("{name} = {value} is outside {least} to {greatest}")
-        }
-        _ => error.to_string(),
-    }
 }
 
 fn build_refusal(file: &str, at: Position, what: String) -> ScriptProblem {
@@ -168,7 +158,7 @@ pub(super) fn merge_settings(scripts: &[Arc<Script>], problems: &mut Vec<ScriptP
             }
             given.push((&choice.name, &script.file));
             if let Err(error) = apply_choice(choice, &mut settings) {
-                problems.push(build_refusal(&script.file, Position::NONE, describe_error(&error)));
+                problems.push(build_refusal(&script.file, Position::NONE, error.to_string()));
             }
         }
     }

@@ -5,6 +5,7 @@ use super::bind::bind_model;
 use super::diagnosis::find_output_unit;
 use super::inputs::list_input_columns;
 use super::model::{Model, Part, simulate_parts};
+use super::text_report::space_unit;
 use adapter_core::channel::{ChannelId, Kind};
 use numerics::statistics::{count_to_f64, median};
 use physics::Scene;
@@ -68,7 +69,7 @@ fn check_value_range(name: &str, numbers: &Numbers, found: &mut Examination) {
     let all = numbers.count_present();
     let example = numbers.present_values().find(outside).unwrap_or_default();
     let (low, high) = channel.range;
-    let unit = if channel.unit == "1" { String::new() } else { format!(" {}", channel.unit) };
+    let unit = space_unit(channel.unit);
     let text = format!("{name}: {outsiders} of {all} values lie outside {low} to {high}{unit}, such as {example}");
     let is_of_wrong_size = |x: &f64| outside(x) && (channel.kind == Kind::Held || x.abs() > low.abs().max(high.abs()));
     let wrong = numbers.present_values().filter(is_of_wrong_size).count();

@@ -5,6 +5,7 @@ use super::expression::Expression;
 use super::model::{Model, Parameter, Part, PartFunction};
 use super::speed_table::SpeedTable;
 use super::term::Term;
+use super::text_report::space_unit;
 use adapter_core::channel::find_nearest_name;
 use physics::{CATALOGUE, Effect, Entry, Form, Role, find_effect};
 use std::collections::BTreeMap;
@@ -276,10 +277,10 @@ impl<'t> Reader<'t> {
             };
             if value < known.range.0 || value > known.range.1 {
                 let (low, high) = known.range;
-                let unit = known.unit;
+                let unit = space_unit(known.unit);
                 self.report_problem(
                     offset,
-                    format!("{kind}.{name} = {value} is outside its physical range {low} to {high} {unit}"),
+                    format!("{kind}.{name} = {value} is outside its physical range {low} to {high}{unit}"),
                 );
             }
             let mut parameter = build_free_parameter(&name, value, known.entry);

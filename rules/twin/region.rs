@@ -1,6 +1,6 @@
 //! Where: the region of time and of operating space in which a missing effect acts.
 
-use super::text_report::{format_short_number, format_signed_number};
+use super::text_report::{format_short_number, format_signed_number, space_unit};
 use numerics::statistics::{count_to_f64, quantile};
 use physics::Scene;
 use physics::explain::Language;
@@ -120,14 +120,15 @@ impl Region {
     /// How much it is here, in words: a mean, or what is typical where both signs would cancel.
     #[must_use]
     pub fn describe_amount(&self, language: Language, unit: &str) -> String {
+        let unit = space_unit(unit);
         match self.both_signs.map(format_short_number) {
             Some(size) => language.select_text(
-                format!("of both signs, typically ±{size} {unit}"),
-                format!("正负交替，典型大小±{size} {unit}"),
+                format!("of both signs, typically ±{size}{unit}"),
+                format!("正负交替，典型大小±{size}{unit}"),
             ),
             None => {
                 let mean = format_signed_number(self.mean);
-                language.select_text(format!("on average {mean} {unit}"), format!("平均{mean} {unit}"))
+                language.select_text(format!("on average {mean}{unit}"), format!("平均{mean}{unit}"))
             }
         }
     }

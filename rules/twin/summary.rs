@@ -1,7 +1,7 @@
 //! The diagnosis in plain words, in both languages.
 
 use super::diagnosis::{Diagnosis, Existence, UNKNOWN, Verdict};
-use super::text_report::format_short_number;
+use super::text_report::{format_short_number, space_unit};
 use adapter_core::bilingual::Bilingual;
 use physics::explain::Language;
 use physics::find_effect;
@@ -111,11 +111,12 @@ pub(super) fn describe_withdrawal(
         true => Bilingual::new("fitted runs that are predicted from the others", "由其他批次预测的拟合批次"),
         false => Bilingual::new("runs that took no part in fitting", "未参与拟合的批次"),
     };
+    let unit = space_unit(unit);
     let errors = errors.map_or_else(Bilingual::default, |(before, after)| {
         let [before, after] = [before, after].map(format_short_number);
         Bilingual::new(
-            format!(" ({before} {unit} without it, {after} {unit} with it)"),
-            format!("（不含它{before} {unit}，含它{after} {unit}）"),
+            format!(" ({before}{unit} without it, {after}{unit} with it)"),
+            format!("（不含它{before}{unit}，含它{after}{unit}）"),
         )
     });
     Bilingual::new(
@@ -136,24 +137,24 @@ pub(super) fn describe_withdrawal(
 
 fn describe_improvement(diagnosis: &Diagnosis) -> Bilingual {
     let Some(fit) = &diagnosis.fit else { return Bilingual::default() };
-    let unit = &diagnosis.unit;
+    let unit = space_unit(&diagnosis.unit);
     let shown = |before: f64, after: f64| [before, after, fit.noise_floor].map(format_short_number);
     match (fit.before.held_out_rmse, fit.after.held_out_rmse) {
         (Some(before), Some(after)) => {
             let [before, after, floor] = shown(before, after);
             Bilingual::new(
                 format!(
-                    "On runs that took no part in fitting the error falls from {before} to {after} {unit}; the noise is \
-                     {floor} {unit}."
+                    "On runs that took no part in fitting the error falls from {before} to {after}{unit}; the noise is \
+                     {floor}{unit}."
                 ),
-                format!("未参与拟合的批次的误差由{before}降至{after} {unit}；噪声为{floor} {unit}。"),
+                format!("未参与拟合的批次的误差由{before}降至{after}{unit}；噪声为{floor}{unit}。"),
             )
         }
         _ => {
             let [before, after, _] = shown(fit.before.rmse, fit.after.rmse);
             Bilingual::new(
-                format!("The error falls from {before} to {after} {unit}."),
-                format!("误差由{before}降至{after} {unit}。"),
+                format!("The error falls from {before} to {after}{unit}."),
+                format!("误差由{before}降至{after}{unit}。"),
             )
         }
     }

@@ -3,6 +3,7 @@
 use super::diagnosis::{Alternative, Diagnosis, Fits, Missing, ParameterEstimate, Shift, Verdict};
 use super::plan::list_experiment_kinds;
 use super::region::Region;
+pub use adapter_core::channel::quantity::space_unit;
 use physics::explain::Language;
 use physics::find_effect;
 use std::fmt::Write as _;
@@ -147,25 +148,25 @@ impl Say<'_> {
     }
 
     fn describe_estimate(&self, estimate: &ParameterEstimate) -> String {
-        let (name, unit) = (&estimate.name, if estimate.unit == "1" { "" } else { &estimate.unit });
+        let (name, unit) = (&estimate.name, space_unit(&estimate.unit));
         let value = format_short_number(estimate.value);
         let (Some(low), Some(high)) = (estimate.low.map(format_short_number), estimate.high.map(format_short_number))
         else {
             return self.language.select_text(
-                format!("{name} = {value} {unit} (interval not computed)"),
-                format!("{name} = {value} {unit}（未计算区间）"),
+                format!("{name} = {value}{unit} (interval not computed)"),
+                format!("{name} = {value}{unit}（未计算区间）"),
             );
         };
         self.language.select_text(
-            format!("{name} = {value} {unit} (95 % between {low} and {high})"),
-            format!("{name} = {value} {unit}（95 %区间{low}至{high}）"),
+            format!("{name} = {value}{unit} (95 % between {low} and {high})"),
+            format!("{name} = {value}{unit}（95 %区间{low}至{high}）"),
         )
     }
 
     fn describe_fit(&self, fit: &Fits) -> Vec<String> {
-        let unit = self.unit;
+        let unit = space_unit(self.unit);
         let arrow = |before: f64, after: f64| {
-            format!("{} -> {} {unit}", format_short_number(before), format_short_number(after))
+            format!("{} -> {}{unit}", format_short_number(before), format_short_number(after))
         };
         let mut lines = Vec::new();
         if let (Some(before), Some(after)) = (fit.before.held_out_rmse, fit.after.held_out_rmse) {
@@ -183,14 +184,14 @@ impl Say<'_> {
         if let Some(ceiling) = &fit.ceiling {
             let error = format_short_number(ceiling.held_out_rmse.unwrap_or(ceiling.rmse));
             lines.push(self.language.select_text(
-                format!("error of the free curve in its place: {error} {unit}"),
-                format!("自由曲线的误差：{error} {unit}"),
+                format!("error of the free curve in its place: {error}{unit}"),
+                format!("自由曲线的误差：{error}{unit}"),
             ));
         }
         let (floor, rows, runs) = (format_short_number(fit.noise_floor), fit.rows, fit.runs);
         lines.push(self.language.select_text(
-            format!("ordinary noise: {floor} {unit}; {rows} rows in {runs} runs were compared"),
-            format!("普通噪声：{floor} {unit}；共比较{runs}个批次{rows}行"),
+            format!("ordinary noise: {floor}{unit}; {rows} rows in {runs} runs were compared"),
+            format!("普通噪声：{floor}{unit}；共比较{runs}个批次{rows}行"),
         ));
         lines
     }
@@ -251,15 +252,13 @@ impl Say<'_> {
     fn list_shifts(&self, diagnosis: &Diagnosis) -> Vec<String> {
         let moved = |shift: &&Shift| format_short_number(shift.before) != format_short_number(shift.after);
         let line = |shift: &Shift| {
-            let unit = diagnosis.find_parameter_unit(&shift.parameter).unwrap_or_default();
+            let unit = space_unit(&diagnosis.find_parameter_unit(&shift.parameter).unwrap_or_default());
             format!(
-                "{}: {} -> {} {unit}",
+                "{}: {} -> {}{unit}",
                 shift.parameter,
                 format_short_number(shift.before),
                 format_short_number(shift.after)
             )
-            .trim_end()
-            .to_owned()
         };
         diagnosis.baseline_shift.iter().filter(moved).map(line).collect()
     }

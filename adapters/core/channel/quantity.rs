@@ -65,6 +65,12 @@ pub fn unit_of(name: &str) -> Option<&'static str> {
     in_table.or_else(|| ENDINGS.iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, unit)| *unit))
 }
 
+/// A unit as it stands behind a number in a sentence: a space and its symbol. A number without a unit (`1`) has none.
+#[must_use]
+pub fn space_unit(unit: &str) -> String {
+    if unit.is_empty() || unit == "1" { String::new() } else { format!(" {unit}") }
+}
+
 /// A column's name without the unit at its end.
 #[must_use]
 pub fn without_unit(name: &str) -> &str {

@@ -2,7 +2,7 @@
 
 use super::{UnitDoubt, list_possible_units};
 use rules::physics::Entry;
-use rules::twin::text_report::format_short_number;
+use rules::twin::text_report::{format_short_number, space_unit};
 use rules::twin::{Model, Parameter, Part, PartFunction};
 
 /// Times its nominal value from which a parameter is asked for. Two machines of a kind differ by less than three.
@@ -58,10 +58,10 @@ fn compare_parameter(part: &Part, nominal: &Parameter, now: &Parameter) -> Optio
         .unwrap_or_else(|| "one of its columns in another unit".to_owned());
     let (times, value, was) =
         (format_short_number(ratio), format_short_number(now.value), format_short_number(nominal.value));
-    let unit = &nominal.unit;
+    let unit = space_unit(&nominal.unit);
     Some(UnitDoubt::new(
         &name,
-        format!("{name} is {times} times its nominal value ({value} for {was} {unit}): is {asked}?"),
-        format!("{name}是名义值的{times}倍（{value}，名义值{was} {unit}）：是否单位有误（{asked}）？"),
+        format!("{name} is {times} times its nominal value ({value} for {was}{unit}): is {asked}?"),
+        format!("{name}是名义值的{times}倍（{value}，名义值{was}{unit}）：是否单位有误（{asked}）？"),
     ))
 }

@@ -11,6 +11,7 @@ use gateway_base::state_file;
 use gateway_config::Config;
 use gateway_diagnosis::handle::DiagnosisHandle;
 use gateway_diagnosis::store::DiagnosisStore;
+use gateway_diagnosis::stretch::ENOUGH_S;
 use gateway_diagnosis::words;
 use gateway_diagnosis::worker::{self, Finished, LoadedModel, Worker, WorkerPaths, WorkerReport};
 use gateway_history::{self as history, Alarm, AlarmClear, ExtraSeries, ExtraValue};
@@ -26,7 +27,7 @@ const SOURCE: &str = "twin";
 /// What was learned is saved about this often.
 const SAVE_EVERY: Duration = Duration::from_secs(600);
 /// A diagnosis needs this much of the machine as it is now,
-const AFTER_NS: i64 = 45 * 60 * SECOND_NS;
+const AFTER_NS: i64 = ENOUGH_S * SECOND_NS;
 /// and this much of it as it was.
 const BEFORE_NS: i64 = 4 * 3600 * SECOND_NS;
 /// Between the beginnings of two diagnoses.

@@ -9,6 +9,7 @@ pub use computer::{ComputerReport, SystemFiles, examine_computer};
 
 use crate::open::open_source;
 use adapters::address::AddressError;
+use adapters::channel::quantity::space_unit;
 use adapters::clock::{Clock, SystemClock};
 use adapters::driver::{Fact, FactValue};
 use adapters::open::OpenError;
@@ -37,7 +38,7 @@ impl fmt::Display for ValueWithUnit {
             // Seven digits are what a meter's single-precision numbers hold.
             Value::Number(number) => {
                 let rounded = format!("{number:.6e}").parse().unwrap_or(*number);
-                write!(f, "{rounded} {}", self.0.channel().unit)
+                write!(f, "{rounded}{}", space_unit(self.0.channel().unit))
             }
             Value::Text(text) => write!(f, "{text:?}"),
         }

@@ -157,7 +157,7 @@ function drawRows(list, state, context) {
       { text: make("span", tone ? `${tone}-text` : "", `${word("kind", g.kind)} · ${word("outcome", g.outcome)}`) },
       figures,
       words,
-      [g.script, g.person].filter(Boolean).join(" · ") || "–",
+      [g.script, box(g.person)].filter(Boolean).join(" · ") || "–",
     ];
     if (!ramp) return [line];
     const opened = state.open.has(first.number);

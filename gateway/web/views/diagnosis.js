@@ -1,138 +1,17 @@
-// Diagnoses in the view of the twin: one asked for over a chosen time, with how far it is; the latest in words; earlier
-// ones; its report, its model to take over, and the experiment it asks for as a list to tick off.
+// Diagnoses in the view of the twin: the latest in words; earlier ones; its report, its model to take over, and the experiment it
+// asks for as a list to tick off.
 import { ask, card, fill, make, row, say, send, table } from "/web/parts.js";
-import { dateTime, duration, number, quantity, unitName } from "/web/format.js";
+import { dateTime, number, quantity, unitName } from "/web/format.js";
 import { language, own, t } from "/web/words.js";
 
-const SPANS_H = [1, 2, 4, 8];
-const STAGES = ["waiting", "reading", "comparing", "writing"];
 /** Steps of an experiment that stand open; the others unfold. */
 const STEPS_IN_SIGHT = 5;
-/** Of a longer time the beginning is left out: 28,800 rows of a second. */
-const LONGEST_H = 8;
 
 export const summaryOf = (found) => own({ en: found.summary, zh: found.summary_zh ?? found.summary });
 /** A model that fits only with other parameters does not agree: the word says so. */
 const moved = (found) => found.verdict === "no_mismatch" && found.beside?.some((one) => one.of_parameters);
 export const verdictOf = (found) => t(moved(found) ? "verdict_parameter" : `verdict_${found.verdict}`);
 const report = (found) => `${found.page}?lang=${language()}`;
-const local = (ms) => new Date(ms - new Date(ms).getTimezoneOffset() * 60000).toISOString().slice(0, 16);
-
-/** The card from which a diagnosis is begun; `changed` is called when another one is finished. */
-export class Asking {
-  constructor(context, changed) {
-    Object.assign(this, { context, changed, run: null });
-    const input = (label) => make("input", "", null, { type: "datetime-local", "aria-label": label });
-    [this.from, this.to] = [input(t("from")), input(t("to"))];
-    const quick = SPANS_H.map((h) =>
-      make("button", "", t("last_hours", h), { type: "button", onclick: () => this.last(h) }),
-    );
-    this.begin = make("button", "primary", t("diagnose"), { type: "button", onclick: () => this.start() });
-    this.end = make("button", "", t("end_diagnosis"), {
-      type: "button",
-      hidden: true,
-      onclick: () => this.act(() => ask("/api/v1/diagnosis", { method: "DELETE" })),
-    });
-    this.note = make("p", "note", " ", { role: "status" });
-    this.bar = make("progress", "progress", null, { max: "1", hidden: true, "aria-label": t("diagnosing") });
-    this.box = card(t("diagnose_title"), [
-      make("p", "note", t("diagnose_words", LONGEST_H)),
-      make("div", "buttons", [
-        make("label", "field", [t("from"), this.from]),
-        make("label", "field", [t("to"), this.to]),
-        ...quick,
-        this.begin,
-        this.end,
-      ]),
-      this.bar,
-      this.note,
-    ]);
-    const asked = new URLSearchParams(location.search);
-    if (asked.get("from")) this.choose(Date.parse(asked.get("from")), Date.parse(asked.get("to") ?? "") || Date.now());
-    this.timer = setInterval(() => this.look(), 2000);
-    this.look();
-  }
-
-  /** The newest hours; the box says what time it is. */
-  last(hours) {
-    const now = this.context.status()?.at_ms;
-    if (now) this.choose(now - hours * 3600000, now);
-  }
-
-  choose(fromMs, toMs) {
-    if (Number.isFinite(fromMs) && Number.isFinite(toMs))
-      [this.from.value, this.to.value] = [local(fromMs), local(Math.ceil(toMs / 60000) * 60000)];
-  }
-
-  update(status) {
-    if (!this.from.value) this.last(1);
-    this.box.hidden = !status.twin;
-    const may = Boolean(this.context.session?.may?.edit);
-    this.begin.disabled = !may || this.run?.state === "running";
-    this.end.disabled = !may;
-    if (!may && this.context.session && !this.told) {
-      this.told = true;
-      say(this.note, t("sign_in_to_diagnose"));
-    }
-  }
-
-  start() {
-    const utc = (field) => new Date(field.value).toISOString();
-    if (!this.from.value || !this.to.value) return say(this.note, t("choose_times"));
-    return this.act(() => send("/api/v1/diagnosis", { from: utc(this.from), to: utc(this.to) }));
-  }
-
-  async act(what) {
-    try {
-      await what();
-      await this.look();
-    } catch (error) {
-      say(this.note, error.message);
-    }
-  }
-
-  async look() {
-    const run = await ask("/api/v1/diagnosis").catch(() => null);
-    if (!run) return;
-    const before = this.run;
-    this.run = run;
-    const running = run.state === "running";
-    this.bar.hidden = this.end.hidden = !running;
-    if (running) {
-      const stage = STAGES.indexOf(run.stage);
-      // Fitting takes nearly all of the time; how long is known from the one before.
-      if (run.about_s) this.bar.value = Math.min(0.97, run.seconds / run.about_s);
-      else this.bar.removeAttribute("value");
-      const about = run.about_s ? t("about_in_all", duration(run.about_s)) : "";
-      say(
-        this.note,
-        [
-          t("stage_of", stage + 1, STAGES.length, t(`stage_${run.stage}`)),
-          run.rows ? t("seconds_examined", run.rows.toLocaleString()) : "",
-          t("running_for", duration(run.seconds)),
-          about,
-          run.by ? t("asked_by", run.by) : t("asked_by_box"),
-        ]
-          .filter(Boolean)
-          .join(" · "),
-      );
-    } else if (before?.state === "running") {
-      say(
-        this.note,
-        run.state === "failed"
-          ? t("diagnosis_failed", run.what)
-          : run.state === "cancelled"
-            ? t("diagnosis_ended", run.by)
-            : t("diagnosis_done", duration(run.seconds)),
-      );
-      this.changed();
-    }
-  }
-
-  leave() {
-    clearInterval(this.timer);
-  }
-}
 
 /** The latest one in words, the earlier ones as a table. */
 export function drawDiagnoses(latest, past, diagnoses, context, done) {
@@ -186,9 +65,6 @@ function fitWords({ fit, unit }) {
 const examinedTime = ({ from_ms, to_ms }) =>
   from_ms === to_ms ? "" : `${t("examined")} ${dateTime(from_ms)} – ${dateTime(to_ms)}`;
 
-/** A sentence of the box without the unit of what has none: "p0 1 → 1.3 1" is "p0 1 → 1.3". */
-const withoutOne = (text) => text.replace(/(?<![\w.])(\d[\d.e-]*) 1(?!\w|[.,]\d)/g, "$1");
-
 function told(found, context, done) {
   const d = found.diagnosis ?? {};
   const parts = [
@@ -220,7 +96,7 @@ function told(found, context, done) {
         row(
           t(`regime_${one.regime}`),
           amount(one.difference),
-          `${withoutOne(own({ en: one.text, zh: one.zh }))} · ${t("beside_of", amount(one.by_parameters), amount(effects(one)), amount(one.left))}`,
+          `${own({ en: one.text, zh: one.zh })} · ${t("beside_of", amount(one.by_parameters), amount(effects(one)), amount(one.left))}`,
           { dot: one.differs ? "bad" : "good" },
         ),
       ),
@@ -236,7 +112,9 @@ function told(found, context, done) {
       row(
         effectText(found, it.effect, "statement", it.statement ?? it.effect),
         name,
-        [it.equation, ...numbers].filter(Boolean).join(" · "),
+        [it.equation ? make("code", "", it.equation) : null, numbers.map((one) => ` · ${one}`).join("")].filter(
+          Boolean,
+        ),
         { dot: "bad" },
       ),
     );

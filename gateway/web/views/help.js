@@ -1,5 +1,5 @@
 // Help: the handbook of the box, offline.
-import { ask, fill, make } from "/web/parts.js";
+import { ask, fill, labelCells, make } from "/web/parts.js";
 import { language, t } from "/web/words.js";
 import { marked } from "/web/marked.js";
 
@@ -21,11 +21,13 @@ export function mount(root, context) {
     const body = await read(name);
     // The chapters are part of the program; the policy of the page lets nothing in them run.
     text.innerHTML = marked.parse(body);
+    text.lang = languageOf(name);
     for (const pre of text.querySelectorAll("pre")) pre.tabIndex = 0;
     for (const wide of text.querySelectorAll("table")) {
       const scroll = make("div", "scroll", null, { tabindex: "0", role: "region", "aria-label": t("table") });
       wide.replaceWith(scroll);
       scroll.append(wide);
+      labelCells(wide);
     }
     for (const link of text.querySelectorAll("a[href$='.md']")) {
       const target = link.getAttribute("href").replace(/^.*\//, "").replace(/\.md$/, "");
@@ -40,6 +42,7 @@ export function mount(root, context) {
     for (const link of menu.querySelectorAll("a")) link.toggleAttribute("aria-current", link.dataset.chapter === name);
   };
   // A chapter for developers that is not written in Chinese is told as one in the list.
+  const languageOf = (name) => (language() === "zh" && chapters.get(name).zh ? "zh-CN" : "en");
   const english = (name) =>
     language() === "en" || chapters.get(name).zh ? null : make("small", "note", ` · ${t("in_english")}`);
   const list = (names) =>
@@ -50,6 +53,7 @@ export function mount(root, context) {
             make("a", "", [chapters.get(name).title, english(name)], {
               href: `/help?chapter=${name}`,
               "data-chapter": name,
+              lang: languageOf(name),
               onclick: (event) => {
                 event.preventDefault();
                 show(name);

@@ -42,7 +42,7 @@ class HistoryView {
     this.move = new Movement({
       get: () => [this.from, this.to],
       set: (from, to) => this.look(from, to),
-      limits: () => [this.first, this.edge(), SHORTEST_S, Math.max(60, (this.edge() - this.first) * 1.02)],
+      limits: () => [this.least(), this.edge(), SHORTEST_S, Math.max(60, (this.edge() - this.least()) * 1.02)],
     });
     this.build();
   }
@@ -171,9 +171,14 @@ class HistoryView {
     return Math.max(this.newest, (this.context.status()?.at_ms ?? 0) / 1000);
   }
 
+  /** The earliest time that can be looked at: where the history begins, or earlier where somebody has asked for that. */
+  least() {
+    return Math.min(this.first, this.from ?? this.first);
+  }
+
   last(seconds) {
     const to = this.edge();
-    this.look(Math.max(this.first, to - seconds), to, true);
+    this.look(to - seconds, to, true);
   }
 
   /** The time that was typed, in the time of this computer. */
@@ -219,10 +224,12 @@ class HistoryView {
   }
 
   /** The charts, as soon as their samples are there. */
-  drawCharts({ series, resolution }, began) {
+  drawCharts({ series, resolution, range: [begin, end] }, began) {
     const empty = series.every((s) => !s.points.some((p) => typeof p[1] === "number"));
     say(this.note, empty ? t("nothing_in_range") : "");
-    for (const plot of this.plots) plot.give(columns(series, plot.names));
+    // Before its first row the history knows of nothing, however early is asked for.
+    const known = { from: begin <= this.first ? Math.min(begin, this.from) : begin, to: Math.min(end, this.edge()) };
+    for (const plot of this.plots) plot.give(columns(series, plot.names), { ...known, width: resolution });
     readOut(this, null, null);
     this.address();
     this.root.dataset.drawnMs = String(Math.round(performance.now() - began));
@@ -248,7 +255,7 @@ class HistoryView {
     this.followed = now;
     const width = this.to - this.from;
     const to = status.at_ms / 1000;
-    if (width < 7200 && to > this.to && this.move.pointers.size === 0) this.look(Math.max(this.first, to - width), to);
+    if (width < 7200 && to > this.to && this.move.pointers.size === 0) this.look(to - width, to);
   }
 
   drawFrame() {

@@ -63,42 +63,45 @@ function sinksCard() {
   return { box: card(t("sinks"), list, "ages"), update };
 }
 
+/** Every key with its value and where that comes from: what somebody has written, and below it what is built in. */
 function configurationCard() {
-  const body = make("div", "");
+  const written = make("div", "");
+  const builtIn = make("div", "");
+  const [summary, builtInTitle] = [make("h3", ""), make("summary", "")];
+  const fold = make("details", "choose", [builtInTitle, builtIn]);
   const file = make("p", "note", " ");
   const search = make("input", "", null, { type: "search", placeholder: t("search"), "aria-label": t("search") });
-  const only = make("input", "", null, { type: "checkbox", checked: true });
   let keys = [];
+  const line = (k) => [
+    { text: make("code", "", k.key) },
+    k.value === null ? t("not_set") : { text: make("code", "", k.value) },
+    t(`from_${k.from}`),
+    own(k),
+  ];
+  const drawInto = (place, title, key, rows) => {
+    say(title, t(key, rows.length));
+    const head = [t("key"), t("value"), t("from_where"), t("what")];
+    fill(place, [
+      rows.length ? table(head, rows.map(line), { caption: t(key, rows.length) }) : make("p", "empty", t("no_match")),
+    ]);
+  };
   const draw = () => {
     const text = search.value.toLowerCase();
-    const rows = keys.filter(
-      (k) => (!only.checked || k.from !== "default") && (!text || JSON.stringify(k).toLowerCase().includes(text)),
+    const found = keys.filter((k) => !text || JSON.stringify(k).toLowerCase().includes(text));
+    const isBuiltIn = (k) => k.from === "default";
+    drawInto(
+      written,
+      summary,
+      "written_values",
+      found.filter((k) => !isBuiltIn(k)),
     );
-    fill(
-      body,
-      rows.length
-        ? [
-            table(
-              [t("key"), t("value"), t("from_where"), t("what")],
-              rows.map((k) => [k.key, { text: make("code", "", k.value ?? "–") }, t(`from_${k.from}`), own(k)]),
-              { caption: t("configuration") },
-            ),
-          ]
-        : [make("p", "empty", t("no_match"))],
-    );
+    drawInto(builtIn, builtInTitle, "built_in_values", found.filter(isBuiltIn));
+    // Whoever looks for a key finds it wherever it stands.
+    if (text) fold.open = true;
   };
   search.addEventListener("input", draw);
-  only.addEventListener("change", draw);
   return {
-    box: card("", [
-      make("div", "head", [
-        make("h2", "", t("configuration")),
-        search,
-        make("label", "step", [only, t("only_written")]),
-      ]),
-      file,
-      body,
-    ]),
+    box: card("", [make("div", "head", [make("h2", "", t("configuration")), search]), file, summary, written, fold]),
     give(known) {
       keys = known.keys;
       say(file, known.file ? t("configuration_of", known.file) : t("configuration_built_in"));

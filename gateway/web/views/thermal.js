@@ -1,13 +1,15 @@
 // Thermal error: what was measured, what the law predicts, what is left; the temperatures it is made of; offsets
 // proposed and written.
 import { ask, card, fill, make, row, say, table } from "/web/parts.js";
-import { folder, number, quantity } from "/web/format.js";
+import { duration, folder, number, quantity } from "/web/format.js";
 import { t } from "/web/words.js";
-import { LINES, TimePlot, drawnFrom } from "/web/plot.js";
+import { LINES, TimePlot } from "/web/plot.js";
 import { columns, resolutionFor } from "/web/history-data.js";
 
 const TEMPERATURE = /(_temperature_c|^temperature_\d+_c)$/;
 const SPAN_S = 8 * 3600;
+/** A figure is no narrower than this. */
+const SPAN_LEAST_S = 60;
 /** A figure of fewer seconds is a dot. Until then it is read anew every second or so, afterwards every twenty. */
 const FIGURE_S = 10;
 const [READ_MS, READ_EARLY_MS] = [20000, 1500];
@@ -25,13 +27,15 @@ export function mount(root, context) {
   const error = make("div", "plot-box");
   const warmth = make("div", "plot-box");
   const note = make("p", "note", " ");
+  const span = make("span", "note", " ");
   const collecting = make("p", "note", "", { hidden: true });
   const [errorKey, list] = [make("div", "legend"), make("div", "legend")];
   const points = make("div", "");
   root.append(
     make("div", "columns", [card(t("thermal_now"), now, "ages"), card(t("thermal_offsets"), offsets, "ages")]),
     card("", [
-      make("div", "head", [make("h2", "", t("thermal_error_figure")), make("span", "note", t("last_eight_hours"))]),
+      make("div", "head", [make("h2", "", t("thermal_error_figure")), span]),
+      make("p", "note", t("thermal_words")),
       collecting,
       errorKey,
       error,
@@ -64,15 +68,19 @@ export function mount(root, context) {
       const found = await ask(
         `/api/v1/samples?from=${from}&to=${to}&channels=${names.join(",")}&resolution_s=${resolution}`,
       );
-      draw(found.series, wanted, measured, predicted, status);
+      // A young history fills its chart, and the words say how much it is.
+      const seen = Math.max(SPAN_LEAST_S, there || 0);
+      say(span, there < SPAN_S ? t("all_recorded_so_far", duration(there || 0)) : t("last_eight_hours"));
+      draw(found, [wanted, measured, predicted], status.at_ms / 1000, seen);
     } catch (problem) {
       say(note, problem.message);
     }
   };
-  const draw = (series, wanted, measured, predicted, status) => {
+  const draw = ({ series, resolution_s: width }, [wanted, measured, predicted], to, seen) => {
     plots.forEach((plot) => plot.destroy());
     plots = [];
-    const range = [(status.at_ms - SPAN_S * 1000) / 1000, status.at_ms / 1000];
+    const drawn = [to - seen, to];
+    const recorded = { from: to - SPAN_S, to, width };
     const of = (name) => series.find((s) => s.channel === name)?.points ?? [];
     const last = (name) => of(name).findLast?.((p) => typeof p[1] === "number")?.[1] ?? null;
     const any = [measured, predicted].some((name) => name && last(name) !== null);
@@ -80,7 +88,7 @@ export function mount(root, context) {
       const names = [measured, predicted].filter(Boolean);
       const data = columns(series, names);
       const [m, p] = [names.indexOf(measured), names.indexOf(predicted)];
-      const drawn = names.map((name, at) => ({
+      const lines = names.map((name, at) => ({
         label: t(name === measured ? "thermal_measured" : "thermal_predicted"),
         unit: "um",
         line: at ? "line-b" : "line-a",
@@ -94,19 +102,19 @@ export function mount(root, context) {
           left.map(() => null),
           left.map(() => null),
         );
-        drawn.push({ label: t("thermal_left"), unit: "um", line: "line-c" });
+        lines.push({ label: t("thermal_left"), unit: "um", line: "line-c" });
       }
       const plot = new TimePlot(error, {
-        series: drawn,
+        series: lines,
         height: 240,
         label: t("thermal_error_figure"),
         low: 0,
         sync: "thermal",
       });
-      plot.give(data);
-      plot.show(drawnFrom(data, ...range), range[1]);
+      plot.give(data, recorded);
+      plot.show(...drawn);
       plots.push(plot);
-      fill(errorKey, drawn.map(keyOf));
+      fill(errorKey, lines.map(keyOf));
       say(note, "");
     } else {
       fill(errorKey, []);
@@ -120,8 +128,8 @@ export function mount(root, context) {
       sync: "thermal",
     });
     const warm = columns(series, wanted);
-    plot.give(warm);
-    plot.show(drawnFrom(warm, ...range), range[1]);
+    plot.give(warm, recorded);
+    plot.show(...drawn);
     plots.push(plot);
     // Without values: the newest of the history are older than those above.
     fill(list, warmths.map(keyOf));

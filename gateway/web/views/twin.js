@@ -3,10 +3,11 @@
 import { ask, card, fill, make, row, say } from "/web/parts.js";
 import { clock, number, printed, quantity, when } from "/web/format.js";
 import { box, own, t } from "/web/words.js";
-import { TimePlot, drawnFrom } from "/web/plot.js";
+import { TimePlot } from "/web/plot.js";
 import { columns } from "/web/history-data.js";
 import { Brought } from "/web/brought.js";
-import { Asking, drawDiagnoses, drawModelBefore, ticked } from "/web/diagnosis.js";
+import { Asking } from "/web/diagnosis-asking.js";
+import { drawDiagnoses, drawModelBefore, ticked } from "/web/diagnosis.js";
 
 const SPANS = [3600, 6 * 3600, 86400, 7 * 86400];
 
@@ -120,11 +121,11 @@ export function mount(root, context) {
         simulated[3].map(() => null),
         ...simulated.slice(1),
       ];
-      const shown = drawnFrom(pair, from, to);
-      both.give(pair);
-      both.show(shown, to);
-      rest.give(difference);
-      rest.show(shown, to);
+      const recorded = { from, to, width: resolution };
+      both.give(pair, recorded);
+      both.show(from, to);
+      rest.give(difference, recorded);
+      rest.show(from, to);
       state.plots = [both, rest];
     } catch (error) {
       say(note, error.message);
@@ -183,7 +184,7 @@ function drawNow(verdict, facts, regimes, status, context) {
     row(t("simulated_value"), value(twin.twin_expected)),
     // The difference of what is printed: figures that were rounded one by one are off by one.
     row(t("twin_residual"), value(printedDifference(twin)), twin.missing ? context.reason(twin.missing) : second),
-    row(t("model"), twin.model, twin.file),
+    row(t("model"), make("span", "typed", twin.model), make("code", "", twin.file)),
     twin.problem ? row(t("model_refused"), "", box(twin.problem), { dot: "bad", tone: "bad" }) : null,
     twin.diagnosing_since_ms
       ? row(t("diagnosing"), t("since_clock", clock(twin.diagnosing_since_ms)), null, { dot: "warn" })

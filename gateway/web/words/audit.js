@@ -51,18 +51,17 @@ export const AUDIT = {
   kind_logout: ["sign-out", "退出"],
   kind_persons: ["persons", "人员"],
   kind_request_refused: ["refused request", "被拒请求"],
+  outcome_was_not_armed: ["was not armed", "原本未允许"],
+  outcome_role: ["role changed", "角色已更改"],
+  outcome_token: ["new token", "令牌已更换"],
   outcome_known: ["known", "已知"],
   outcome_added: ["added", "新增"],
   outcome_removed: ["removed", "移除"],
   kind_offset: ["offset", "补偿"],
   gate_title: ["May the box change the feed?", "网关是否可调整进给？"],
   arm_at_box: [
-    "Arming is done at the box itself: cnc-gateway arm --for 30m --by NAME",
-    "需在网关本机上允许：cnc-gateway arm --for 30m --by 姓名",
-  ],
-  arm_not_configured: [
-    "This box cannot be armed: its configuration lets it write nothing. Set mode = \u0022armed\u0022 and source = \u0022NAME\u0022 in the section [gate] of its file and start it again.",
-    "本机不可允许写入：配置为不写入。请在配置文件的 [gate] 中设置 mode = \u0022armed\u0022 和 source = \u0022名称\u0022，然后重新启动。",
+    "Arming is done at the box itself: `cnc-gateway arm --for 30m --by NAME`",
+    "需在网关本机上允许：`cnc-gateway arm --for 30m --by 姓名`",
   ],
   arm_here: ["Arming asks for your token again.", "允许写入时需再次输入令牌。"],
   sources: ["Sources", "数据源"],
@@ -97,4 +96,8 @@ export const AUDIT = {
   script_suspended: ["failed: asks for nothing", "出错：已停止请求"],
   script_refused: ["refused: the version before it stays", "未接受：上一版本保留"],
   version_of: ["version {0}", "版本 {0}"],
+  arm_not_configured: [
+    "This box cannot be armed: its configuration lets it write nothing. Set `mode = \u0022armed\u0022` and `source = \u0022NAME\u0022` in the section `[gate]` of its file and start it again.",
+    "本机不可允许写入：配置为不写入。请在配置文件的 `[gate]` 中设置 `mode = \u0022armed\u0022` 和 `source = \u0022名称\u0022`，然后重新启动。",
+  ],
 };

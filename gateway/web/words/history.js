@@ -66,6 +66,7 @@ export const HISTORY = {
   by_week: ["Week", "周"],
   week_of: ["week of {0}", "{0} 起的一周"],
   recorded: ["Recorded", "已记录"],
+  not_recorded: ["not recorded", "未记录"],
   recorded_value: ["Recorded", "实测"],
   switched_on: ["Switched on", "开机"],
   cutting_share: ["Cutting of switched on", "切削/开机"],

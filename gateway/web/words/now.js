@@ -73,8 +73,8 @@ export const NOW = {
   controller: ["controller", "数控系统"],
   also_measured: ["Also measured", "其他测量值"],
   demo_note: [
-    "This is a demonstration: a simulated lathe. Within five minutes it goes through all its states, raises an alarm, wears a tool out (see Tool wear) and differs from its simulation since before it was started (see Twin).",
-    "这是演示：模拟车床。五分钟内会经历所有状态、产生报警、刀具磨损，且启动之前已与仿真有偏差（见“仿真对照”）。",
+    "This is a demonstration: a simulated lathe, nothing real moves. In five minutes it goes through a whole day: warm-up, parts, a pause, an alarm. One edge is nearly worn, which the box tells within two minutes (see Tool wear). Its spindle has more friction than its model knows, which the box has noticed before (see Twin).",
+    "这是演示：模拟车床，没有真实动作。五分钟内走完一整天：预热、加工、停顿、报警。一个刀刃即将磨损，两分钟内网关会告知（见“刀具磨损”）。主轴摩擦大于模型所知，网关此前已发现（见“仿真对照”）。",
   ],
   simulated_note: ["A simulated machine: nothing real is moved.", "模拟机床：无真实动作。"],
   demo_fast: [

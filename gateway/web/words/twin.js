@@ -168,4 +168,9 @@ export const TWIN = {
     "Your simulation as given is off by {0}; with gain {2} and offset {3} by {1}.",
     "您的仿真误差为 {0}；乘以 {2} 加 {3} 后为 {1}。",
   ],
+  recorded_so_far: ["Of this time {0} are recorded.", "该时段已记录 {0}。"],
+  little_recorded: [
+    "Only {0} of this time are recorded. From {1} on the answer can be relied upon; with less, few cuts of each kind are in it: the diagnosis finds large causes only, and more often ends in “cannot be told”.",
+    "该时段仅记录了 {0}。达到 {1} 后结论才可靠；不足时各类切削太少：只能发现大的原因，更常得到“无法判断”。",
+  ],
 };

@@ -31,7 +31,7 @@ static METHODS: &[Method] = &[
         returns: "W",
         en: "Cutting power [Pc] of an edge worn to the criterion in this cut; model: the line that identify tool-wear prints for \
              scripts; no value outside the cuts that the model was fitted on, nor where the wear cannot be seen",
-        zh: "达到磨损标准时的切削功率阈值；超出试验范围或不可观测时无值",
+        zh: "达到磨钝标准时的切削功率阈值；超出试验范围或不可观测时无值",
         run: |given| {
             let (model, cut, criterion_mm) = (read_model(given)?, read_conditions(given, 1), given.number(4));
             let limit = compute_power_limit(&model, &cut, criterion_mm)?;

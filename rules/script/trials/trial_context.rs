@@ -9,6 +9,7 @@ use crate::status::ScriptCondition;
 use crate::vocabulary::{find_word, list_words};
 use crate::{Host, WordKind};
 use adapter_core::channel::find_nearest_name;
+use adapter_core::channel::quantity::space_unit;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use adapter_core::{Absence, ChannelId, Sample, Slot, Value};
 use estimators::loads::{Figure, LoadEstimator};
@@ -221,7 +222,7 @@ impl TrialContext {
             (Some(number), _, false) if channel.accepts_number(number) => Ok(Value::Number(number)),
             (Some(number), _, false) => {
                 let (least, greatest) = channel.range;
-                return Err(format!("{id} = {number} is outside {least} to {greatest} {}", channel.unit));
+                return Err(format!("{id} = {number} is outside {least} to {greatest}{}", space_unit(channel.unit)));
             }
             (_, Some(text), true) => Ok(Value::Text(text.into())),
             (_, _, true) => return Err(format!("{id} needs a text, or () for no value")),

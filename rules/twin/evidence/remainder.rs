@@ -3,7 +3,7 @@
 
 use super::report::EvidenceReport;
 use crate::diagnosis::Verdict;
-use crate::text_report::format_short_number;
+use crate::text_report::{format_short_number, space_unit};
 use adapter_core::bilingual::Bilingual;
 use adapter_core::channel::quantity::Quantity;
 use numerics::statistics::{count_to_f64, mean, rms};
@@ -90,12 +90,12 @@ impl EvidenceReport<'_, '_> {
         }
         let share = (off * off - on * on).abs() / (off * off + on * on);
         let [off, on, low, high] = [off, on, low, high].map(format_short_number);
-        let unit = self.output_unit();
+        let unit = space_unit(self.output_unit());
         Some(Finding {
             share,
             text: Bilingual::new(
-                format!("{on} {unit} while {name} is {high}, {off} {unit} while it is {low}"),
-                format!("{name}为{high}时{on} {unit}，为{low}时{off} {unit}"),
+                format!("{on}{unit} while {name} is {high}, {off}{unit} while it is {low}"),
+                format!("{name}为{high}时{on}{unit}，为{low}时{off}{unit}"),
             ),
         })
     }
@@ -130,12 +130,12 @@ impl EvidenceReport<'_, '_> {
             return None;
         }
         let size = format_short_number((product / count_to_f64(left.len())).max(0.0).sqrt());
-        let (unit, percent) = (self.output_unit(), 100.0 * share);
+        let (unit, percent) = (space_unit(self.output_unit()), 100.0 * share);
         Some(Finding {
             share,
             text: Bilingual::new(
-                format!("{size} {unit} follow {name} ({percent:.0} % of it)"),
-                format!("{size} {unit}随{name}变化（占{percent:.0} %）"),
+                format!("{size}{unit} follow {name} ({percent:.0} % of it)"),
+                format!("{size}{unit}随{name}变化（占{percent:.0} %）"),
             ),
         })
     }
@@ -157,10 +157,10 @@ impl EvidenceReport<'_, '_> {
         if slow < SLOW_NOISE * within.sqrt() || slow < SLOW_OUTPUT * self.comparison.size {
             return None;
         }
-        let (slow, unit) = (format_short_number(slow), self.output_unit());
+        let (slow, unit) = (format_short_number(slow), space_unit(self.output_unit()));
         Some(Bilingual::new(
-            format!("{slow} {unit} of slow change that I cannot tell from noise"),
-            format!("{slow} {unit}的缓慢变化，无法与噪声区分"),
+            format!("{slow}{unit} of slow change that I cannot tell from noise"),
+            format!("{slow}{unit}的缓慢变化，无法与噪声区分"),
         ))
     }
 }

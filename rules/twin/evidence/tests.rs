@@ -2,7 +2,9 @@
 
 use super::diagnose_recording;
 use crate::diagnosis::Verdict;
+use crate::text_report::format_report;
 use crate::{Diagnosis, parse_model};
+use physics::explain::Language;
 use recording::read_csv;
 use std::fmt::Write;
 
@@ -90,4 +92,32 @@ fn what_is_told_of_a_friction_is_what_its_file_does() {
     let found = check_told_is_written(&recorded(20.0), MODEL);
     let missing = &found.missing[0];
     assert!(missing.delta_ic.expect("fitted") > 0.0 && missing.probability.expect("named") > 0.5, "{missing:?}");
+}
+
+/// Numbers with a lone 1 behind them, which is the unit of what has none: "1.3 1".
+fn numbers_before_a_one(text: &str) -> Vec<&str> {
+    let parts: Vec<&str> = text.split([' ', '\u{a0}']).collect();
+    let is_one =
+        |part: &str| part.trim_matches(|c: char| !c.is_ascii_digit() && c != '.') == "1" && part.starts_with('1');
+    let is_number = |part: &str| part.parse::<f64>().is_ok();
+    parts.windows(2).filter(|pair| is_number(pair[0]) && is_one(pair[1])).map(|pair| pair[0]).collect()
+}
+
+#[test]
+fn no_sentence_of_a_quantity_without_a_unit_carries_a_one() {
+    assert_eq!(numbers_before_a_one("p0 1 → 1.3 1, noise 2 1; 1 1.5"), ["1.3", "2"], "what is looked for is found");
+    // Named so, the output has no unit.
+    for level in [0.0, 3.0, 20.0] {
+        let text = recorded(level).replace("force_n", "pull");
+        let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
+        let model = parse_model(&MODEL.replace("force_n", "pull")).expect("fine");
+        let found = diagnose_recording(&recording, &model, 1).expect("usable");
+        assert_eq!(found.unit, "1");
+        for language in [Language::En, Language::Zh] {
+            let said = format_report(&found, language);
+            assert_eq!(numbers_before_a_one(&said), Vec::<&str>::new(), "{said}");
+        }
+        let summary = format!("{}\n{}", found.summary.en, found.summary.zh);
+        assert_eq!(numbers_before_a_one(&summary), Vec::<&str>::new(), "{summary}");
+    }
 }

@@ -1,22 +1,27 @@
 //! The whole box: real child processes, sockets, files, signals and a browser.
 
+mod asking;
 mod backup;
 mod brought;
 mod browser;
+mod chinese;
 mod clock;
 mod cost;
 mod diagnosing;
 mod editing;
 mod facts;
+mod gaps;
 mod hostile;
 mod http;
 mod kill;
 mod lives;
 mod long_files;
+mod marks;
 mod operations;
 mod package;
 mod packaged_root;
 mod page;
+mod reading;
 mod readme;
 mod replay;
 mod service;
@@ -29,5 +34,6 @@ mod update_scenarios;
 mod views;
 mod watchdog;
 mod wear;
+mod wear_view;
 mod words;
 mod year;

@@ -55,6 +55,7 @@ fn the_box_itself_is_looked_after_from_the_page() {
         "document.body?.dataset.fresh === 'yes' && document.querySelectorAll('.recipe tbody tr').length === 1",
     );
     browser.wait_until("document.body.innerText.includes('5:30 17:30')");
+    configuration(&mut browser, &address);
     wait_for("the sink that fails", Duration::from_secs(30), || {
         let status = get(&address, "/api/v1/status").json();
         (status["sinks"][0]["failing"] == true).then_some(())
@@ -67,6 +68,32 @@ fn the_box_itself_is_looked_after_from_the_page() {
     recipe(&mut browser, &place.join("recipe.toml"));
     archives(&mut browser, place);
     gateway.stop();
+}
+
+/// Every key that the box knows stands on the page with its value and where that comes from; what is in no file too.
+fn configuration(browser: &mut Browser, address: &str) {
+    let keys = get(address, "/api/v1/configuration").json()["keys"].as_array().expect("keys").clone();
+    let shown = browser.value(
+        "Object.fromEntries([...document.querySelectorAll('main td code')].filter((it) => it.textContent.startsWith('['))
+            .map((it) => [it.textContent, [...it.closest('tr').cells].slice(1, 3).map((cell) => cell.textContent)]))",
+    );
+    let words = |from: &str| match from {
+        "file" => "configuration file",
+        "command_line" => "command line",
+        "environment" => "environment variable",
+        "default" => "built in, in no file",
+        other => panic!("where is {other}?"),
+    };
+    for key in &keys {
+        let name = key["key"].as_str().expect("a name");
+        let value = key["value"].as_str().unwrap_or("not set");
+        assert_eq!(shown[name], json!([value, words(key["from"].as_str().expect("a word"))]), "{name}");
+    }
+    let from = |name: &str| keys.iter().find(|key| key["key"] == name).map(|key| key["from"].clone());
+    assert_eq!(from("[gateway] name"), Some(json!("file")));
+    assert_eq!(from("[http] listen"), Some(json!("command_line")));
+    assert_eq!(from("[http] tls"), Some(json!("default")));
+    assert!(keys.len() > 60, "{} keys", keys.len());
 }
 
 fn doctor(browser: &mut Browser) {

@@ -1,7 +1,9 @@
 //! Every view of the page in a real browser, with live data and a history: no fault in the console, no request off the box,
-//! nothing wider than the window, nothing that axe calls a serious barrier, both languages, narrow and wide, light and dark.
+//! nothing wider than the window, no text that is cut, no English on a Chinese page, nothing that axe calls a serious barrier, both
+//! languages, narrow and wide, light and dark.
 
 use super::browser::{self, Browser};
+use super::reading::{cut_texts, english_words, unfold};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -120,14 +122,21 @@ fn look(browser: &mut Browser, address: &str, axe: Option<&str>, (view, drawn): 
         assert!(found.is_empty(), "{name}:\n{}", found.join("\n"));
     }
     picture(browser, &name);
+    unfold(browser);
+    let cut = cut_texts(browser);
+    assert!(cut.is_empty(), "{name}:\n{}", cut.join("\n"));
+    if language == "zh" {
+        let english = english_words(browser);
+        assert!(english.is_empty(), "{name} is English here:\n{}", english.join("\n"));
+    }
     let faults = browser.faults(address);
     assert!(faults.is_empty(), "{name}:\n{}", faults.join("\n"));
 }
 
-/// Each view narrow, English and dark, and wide, Chinese and light.
+/// Each view narrow in both languages, and wide in Chinese.
 #[test]
 fn every_view_is_whole_narrow_and_wide() {
-    every_view(&[("en", 390, "dark"), ("zh", 1920, "light")]);
+    every_view(&[("en", 390, "dark"), ("zh", 390, "light"), ("zh", 1920, "light")]);
 }
 
 /// `CNC_GATEWAY_PICTURES=/tmp/pictures cargo test --test box every_view_in_every -- --ignored`

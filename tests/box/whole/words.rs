@@ -69,6 +69,103 @@ fn chinese(text: &str) -> bool {
     text.chars().any(|c| ('\u{4e00}'..='\u{9fff}').contains(&c))
 }
 
+/// What the box can answer a person: every sentence in a handler of the interface, with `{}` for what is filled in.
+fn sentences_of_the_box() -> BTreeSet<String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("gateway/http");
+    let mut found = BTreeSet::new();
+    for entry in std::fs::read_dir(folder).expect("readable").map(|entry| entry.expect("readable").path()) {
+        let name = entry.file_name().expect("a name").to_string_lossy().into_owned();
+        if entry.extension().is_none_or(|end| end != "rs") || NO_ANSWERS.contains(&name.as_str()) {
+            continue;
+        }
+        let text = std::fs::read_to_string(&entry).expect("text");
+        let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+        for literal in literals(code) {
+            let blanks = literal.split(' ').count();
+            let letters = literal.chars().all(|c| c != '<' && c != '\n' && !chinese(&c.to_string()));
+            if blanks >= 3
+                && literal.len() < SENTENCE_MAX
+                && letters
+                && !literal.contains("; charset=")
+                && !NO_SENTENCES.iter().any(|it| without_names(it) == without_names(&literal))
+            {
+                found.insert(without_names(&literal));
+            }
+        }
+    }
+    found
+}
+
+/// Files whose texts are no answers to a person who reads the page: metrics, headers, the description of the interface, pages of their own
+/// with both languages, and what goes to the log.
+const NO_ANSWERS: [&str; 7] =
+    ["description.rs", "headers.rs", "metrics.rs", "plain.rs", "server.rs", "vocabulary.rs", "wear.rs"];
+/// Texts that are no sentences of an answer: reasons in the source, and the history's own words.
+const NO_SENTENCES: [&str; 10] = [
+    "saturates, which is meant",
+    "microseconds suffice beyond a hundred days",
+    "each piece was measured before it was taken",
+    "seconds of centuries fit",
+    "{} {path} ({code}){words}",
+    "{} {} from {}: {}",
+    "{} (from {})",
+    // A person and one of four roles: each role has its sentence.
+    "{name} is {}",
+    "/api/v1/identified/{subject}; known are {}",
+    "{}={value}; Path=/; Max-Age={seconds}; HttpOnly; SameSite=Strict{secure}",
+];
+/// A longer text is no sentence of an answer: it is the letter that lies in the archive for support.
+const SENTENCE_MAX: usize = 220;
+
+/// The texts between quotation marks, with lines that are continued put together.
+fn literals(code: &str) -> Vec<String> {
+    let (mut all, mut open, mut escaped): (Vec<String>, Option<String>, bool) = (Vec::new(), None, false);
+    let code: String = code.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
+    let mut before = ' ';
+    for c in code.chars() {
+        match (&mut open, c) {
+            (Some(text), _) if escaped => {
+                // A line that is continued goes on with its first letter.
+                if !c.is_whitespace() {
+                    text.push(c);
+                    escaped = false;
+                }
+                continue;
+            }
+            (Some(_), '\\') => escaped = true,
+            (Some(_), '"') => all.extend(open.take()),
+            (Some(text), _) => text.push(c),
+            (None, '"') if before != '\'' => open = Some(String::new()),
+            _ => {}
+        }
+        before = c;
+    }
+    all
+}
+
+/// `{name:?}` and `{0}` are `{}`.
+fn without_names(text: &str) -> String {
+    let mut pieces = text.split('{');
+    let mut all = pieces.next().unwrap_or_default().to_owned();
+    for piece in pieces {
+        all.push_str("{}");
+        all.push_str(piece.split_once('}').map_or(piece, |(_, rest)| rest));
+    }
+    all
+}
+
+#[test]
+fn every_answer_of_the_interface_has_a_chinese_sentence() {
+    let known: BTreeSet<String> = read("box-sentences.js")
+        .split("[\n    \"")
+        .flat_map(|text| text.split("  [\""))
+        .filter_map(|text| Some(without_names(text.split_once("\",")?.0)))
+        .collect();
+    let missing: Vec<String> = sentences_of_the_box().into_iter().filter(|it| !known.contains(it)).collect();
+    assert!(sentences_of_the_box().len() > 100, "the sources were not understood");
+    assert!(missing.is_empty(), "no Chinese in box-sentences.js for:\n{}", missing.join("\n"));
+}
+
 /// Texts that are the same in both languages.
 const SAME: [&str; 1] = ["rpm"];
 

@@ -82,6 +82,7 @@ export function drawRibbon(view) {
     shares: found.shares,
     marks,
     parts: near ? found.parts.map((p) => p.to_ms / 1000) : [],
+    unrecorded: view.plots[0]?.unrecorded ?? [],
   });
 }
 

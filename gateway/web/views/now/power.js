@@ -2,10 +2,12 @@
 import { ask, make, say } from "/web/parts.js";
 import { number, printed, quantity as shown } from "/web/format.js";
 import { t } from "/web/words.js";
-import { TimePlot, drawnFrom } from "/web/plot.js";
+import { TimePlot } from "/web/plot.js";
 import { StateRibbon } from "/web/ribbon.js";
 import { show } from "/web/now-values.js";
 
+/** Seconds without a message that are a gap, and the speed of a machine that goes as fast as it can. */
+const [WAIT_S, SPEED_MOST] = [2, 1000];
 /** The trend behind the big numbers. */
 const TREND_S = 600;
 /** Power that flows back is called braking from here on: more than the noise of a power meter about zero. Too low, a
@@ -112,18 +114,34 @@ export function strip() {
   return { box: section, update };
 }
 
+/** The stream comes several times a second of real time; this long after a message, in machine time, there is a gap. */
+const longestWait = (status) => WAIT_S * (status.speed ?? SPEED_MOST);
+
+/** What the two lines are, each as it is drawn. */
+function lineKey() {
+  const one = (line, key, shape) => {
+    const mark = make("i", shape);
+    mark.style.setProperty("--mark", `var(--${line})`);
+    return make("span", "", [mark, t(key)]);
+  };
+  return make("div", "legend", [
+    one("line-a", "short_spindle_power_w", ""),
+    one("soft", "short_no_load_power_w", "dashed"),
+  ]);
+}
+
 /** Ten minutes of spindle power and state. What is older than the page comes from the history. */
 export function trend(context) {
   const ribbonBox = make("div", "ribbon-box");
   const plotBox = make("div", "plot-box");
   const link = make("a", "grow", t("open_history"), { href: "/history", "data-view": "history" });
   const section = make("section", "card trend ages", [
-    make("div", "head", [make("h2", "", t("last_ten_minutes")), link]),
+    make("div", "head", [make("h2", "", t("last_ten_minutes")), lineKey(), link]),
     ribbonBox,
     plotBox,
   ]);
   const points = [];
-  let [plot, ribbon, asked, states, askedAt] = [null, null, false, [], 0];
+  let [plot, ribbon, asked, states, askedAt, loaded] = [null, null, false, [], 0, false];
   const draw = (status) => {
     const to = status.at_ms / 1000;
     if (!plot) {
@@ -142,10 +160,11 @@ export function trend(context) {
     const x = points.map((p) => p[0]);
     const nothing = points.map(() => null);
     const data = [x, points.map((p) => p[1]), nothing, nothing, points.map((p) => p[2]), nothing, nothing];
-    const from = drawnFrom(data, to - TREND_S, to);
-    plot.give(data);
+    const from = to - TREND_S;
+    // Before the history has answered nobody knows what was recorded.
+    plot.give(data, { from: loaded ? from : x[0], to, least: longestWait(status) });
     plot.show(from, to);
-    ribbon.show(from, to, states);
+    ribbon.show(from, to, states, { unrecorded: plot.unrecorded });
   };
   const past = async (status) => {
     const utc = (ms) => new Date(ms).toISOString();
@@ -158,6 +177,7 @@ export function trend(context) {
     const old = power.points.map((p, at) => [p[0] / 1000, p[1], idle?.points[at]?.[1] ?? null]);
     const last = old.at(-1)?.[0] ?? 0;
     points.splice(0, points.length, ...old, ...points.filter((p) => p[0] > last));
+    loaded = true;
     const known = found.rows.map((s) => ({
       from: s.from_ms / 1000,
       to: (s.to_ms ?? status.at_ms) / 1000,
@@ -171,6 +191,8 @@ export function trend(context) {
       const it = context.quantity(key);
       return it && !it.missing ? it.value : null;
     };
+    // A page that was not looked at has missed what the history has.
+    if (points.length && status.at_ms / 1000 - points.at(-1)[0] > longestWait(status)) asked = false;
     points.push([status.at_ms / 1000, value("spindle_power_w"), value("no_load_power_w")]);
     while (points.length && points[0][0] < status.at_ms / 1000 - TREND_S - 5) points.shift();
     const last = states.at(-1);

@@ -1,12 +1,12 @@
 // What trials and a run over the history say about a draft.
 import { fill, make, row, say, table } from "/web/parts.js";
 import { duration, number } from "/web/format.js";
-import { localTimes, t } from "/web/words.js";
+import { language, localTimes, t } from "/web/words.js";
 
 export function showTrials(view, found) {
   const lines = found.trials.map((r) =>
     row(
-      r.name,
+      language() === "zh" ? make("code", "", `trial_${r.name.replaceAll(" ", "_")}`) : r.name,
       r.problem ? t("trial_failed") : t("trial_passed"),
       r.problem ? `${t("line")} ${r.problem.line}: ${r.problem.what}` : t("trial_words", r.met, number(r.seconds, "s")),
       { dot: r.problem ? "bad" : "good", tone: r.problem ? "bad" : "" },

@@ -42,7 +42,7 @@ export function recipeCard(context) {
       input.addEventListener("input", () => {
         line[key] = input.value;
       });
-      return make("td", "", input);
+      return make("td", "", input, { "data-label": t(`recipe_${key}`) });
     };
     const lines = state.rows.map((line, at) =>
       make("tr", "", [
