@@ -68,6 +68,8 @@ pub fn find_effect(kind: &str) -> Option<&'static dyn Effect> {
 }
 
 #[cfg(test)]
+mod cut_law_tests;
+#[cfg(test)]
 mod law_tests;
 #[cfg(test)]
 mod tests;
