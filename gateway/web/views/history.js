@@ -173,7 +173,7 @@ class HistoryView {
 
   /** The earliest time that can be looked at: where the history begins, or earlier where somebody has asked for that. */
   least() {
-    return Math.min(this.first, this.from ?? this.first);
+    return Math.min(this.first, this.lowest ?? this.first);
   }
 
   last(seconds) {
@@ -192,6 +192,7 @@ class HistoryView {
   /** Looks at another time: at once with what is there, then with what the history says. */
   look(from, to, now = false) {
     [this.from, this.to] = [from, Math.max(to, from + SHORTEST_S)];
+    this.lowest = Math.min(this.lowest ?? from, from);
     this.following = this.to >= this.edge() - Math.max(3, 0.01 * (this.to - this.from));
     for (const plot of this.plots) plot.show(this.from, this.to);
     drawRibbon(this);

@@ -63,7 +63,7 @@ fn a_person_tells_scrap_and_an_order_on_the_page() {
     }
     browser.wait_until("document.querySelector('.tab-body table')?.textContent.includes('chatter')");
     add(&mut browser, "scrap", "", "");
-    browser.wait_until("document.querySelector('.facts-form + .note').textContent.includes('scrap needs `parts`')");
+    browser.wait_until("document.querySelector('.facts-form + .note').textContent.includes('scrap needs parts')");
     assert_eq!(get(&address, "/api/v1/facts?from=-1h&to=now").json()["rows"].as_array().map(Vec::len), Some(2));
     let audit = get(&address, "/api/v1/audit").json();
     let of_facts = audit["rows"].as_array().expect("rows").iter().filter(|row| row["kind"] == "fact").count();
