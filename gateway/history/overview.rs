@@ -61,16 +61,14 @@ impl Reader {
     /// [`HistoryError::Question`] for a series that does not exist or more than a million buckets;
     /// [`HistoryError::Damaged`], or what `SQLite` says.
     pub fn read_overview(&self, query: &Query, width_ns: i64) -> Result<Overview, HistoryError> {
+        let _view = self.begin_view()?;
         self.refuse_too_many(query, width_ns)?;
         let known: Arc<[Series]> = self.read_series()?.into();
         let level = Level::for_width(width_ns).filter(|_| !query.has_filter());
         if let Some(level) = level {
-            let view = self.db.unchecked_transaction().with_activity("beginning to read")?;
             let wanted = self.wanted_numbers(query, &known, level)?;
             if wanted.iter().all(|series| series.kind == SeriesKind::Number) {
-                let building = self.read_pyramid(query, wanted, width_ns, level, &known)?;
-                drop(view);
-                return Ok(building.into_overview());
+                return Ok(self.read_pyramid(query, wanted, width_ns, level, &known)?.into_overview());
             }
         }
         self.read_samples(query, width_ns)

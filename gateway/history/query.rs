@@ -1,7 +1,7 @@
 //! Questions to a history: which time, which series, how fine, under which conditions.
 
 use super::block::Cells;
-use super::error::{Doing, HistoryError};
+use super::error::HistoryError;
 use super::options::SeriesKind;
 use super::reader::Reader;
 use super::reason::Reasons;
@@ -93,7 +93,7 @@ impl Reader {
         query: &Query,
         mut each: impl FnMut(&Chunk<'_>) -> ControlFlow<()>,
     ) -> Result<(), HistoryError> {
-        let _view = self.db.unchecked_transaction().with_activity("beginning to read")?;
+        let _view = self.begin_view()?;
         let known: Arc<[Series]> = self.read_series()?.into();
         let wanted = self.resolve_series(query, &known)?;
         let conditions = build_conditions(query, &known)?;
@@ -127,6 +127,7 @@ impl Reader {
         query: &Query,
         known: &Arc<[Series]>,
     ) -> Result<Vec<(Series, bool)>, HistoryError> {
+        let _view = self.begin_view()?;
         let mut seen = vec![(false, false); known.len()];
         let mut walk = Walk::new(&self.db, query.range(), known.clone())?;
         while let Some(stretch) = walk.next(&self.db)? {

@@ -9,7 +9,7 @@ use super::series::Series;
 use super::walk::Walk;
 use adapter_core::clock::TimeNs;
 use gateway_base::clock;
-use rusqlite::Connection;
+use rusqlite::{Connection, Transaction};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -54,6 +54,15 @@ impl Reader {
     /// What `SQLite` says.
     pub fn read_series(&self) -> Result<Vec<Series>, HistoryError> {
         schema::known_series(&self.db)
+    }
+
+    /// One moment's view of the file for as long as it is kept: what the gateway writes and compacts meanwhile is not seen. `None` within a
+    /// view that is kept already.
+    pub(crate) fn begin_view(&self) -> Result<Option<Transaction<'_>>, HistoryError> {
+        if !self.db.is_autocommit() {
+            return Ok(None);
+        }
+        self.db.unchecked_transaction().map(Some).with_activity("beginning to read")
     }
 
     /// Time of the first and the last row; `None` when there are no rows.

@@ -59,6 +59,7 @@ impl Walk {
     /// Through the rows at or after `range.start` and before `range.end`. `series` are all the file knows. Call inside a
     /// read transaction, so that a block sealed meanwhile is not seen twice.
     pub(crate) fn new(db: &Connection, range: Range<TimeNs>, series: Arc<[Series]>) -> Result<Self, HistoryError> {
+        debug_assert!(!db.is_autocommit(), "a block that is compacted meanwhile is gone: read within a view");
         let blocks = blocks_in(db, &range)?;
         let sealed: Option<i64> = db
             .query_row("SELECT first_row + rows FROM blocks ORDER BY first_row DESC LIMIT 1", [], |row| row.get(0))

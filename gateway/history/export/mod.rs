@@ -91,6 +91,7 @@ impl Reader {
     /// [`Reader::for_each_chunk`] says.
     pub fn export_to_file(&self, query: &Query, path: &Path) -> Result<u64, HistoryError> {
         let format = Format::from_path(path)?;
+        let _view = self.begin_view()?;
         let plan = self.plan_columns(query)?;
         let file = File::create(path).map_err(add_path(path))?;
         let out = BufWriter::with_capacity(1 << 16, file);
@@ -106,6 +107,7 @@ impl Reader {
     /// # Errors
     /// As [`Reader::export_to_file`].
     pub fn export_csv(&self, query: &Query, out: impl std::io::Write, name: &Path) -> Result<u64, HistoryError> {
+        let _view = self.begin_view()?;
         let plan = self.plan_columns(query)?;
         csv::write(self, query, &plan, out, name)
     }

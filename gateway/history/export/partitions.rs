@@ -73,6 +73,7 @@ impl Reader {
         let file = |kind: &str| day_file(root, kind, (machine, &box_id), day_ns);
         let query = Query::between(day_ns, day_ns + DAY_NS);
         if self.has_samples(&query)? {
+            let _view = self.begin_view()?;
             let plan = self.plan_columns(&query)?;
             let about = [("machine".to_owned(), machine.to_owned())];
             written.samples =

@@ -24,6 +24,7 @@ impl Reader {
     /// # Errors
     /// [`HistoryError::Question`] when there are no rows, and what [`Reader::for_each_chunk`] says.
     pub fn read_recording(&self, query: &Query) -> Result<Recording, HistoryError> {
+        let _view = self.begin_view()?;
         let plan = self.plan_columns(query)?;
         let mut building = ColumnBuilder::new(&plan);
         self.for_each_chunk(&Query { series: plan.series_names(), ..query.clone() }, |chunk| {

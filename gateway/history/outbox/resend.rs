@@ -10,7 +10,6 @@ use super::item::{Cell, Content, Gap, Item, Reading, SeriesInfo};
 use super::line;
 use super::means;
 use super::report::OutboxSettings;
-use crate::error::Doing;
 use crate::list::{AlarmEntry, RecordSpan, StateInterval};
 use crate::pyramid::LEVELS;
 use crate::query::{Chunk, Query};
@@ -179,7 +178,7 @@ impl<'a> ResentItems<'a> {
                 .map(move |bucket| (level, bucket))
         };
         let due: BTreeSet<(usize, i64)> = (0..LEVELS.len()).flat_map(of_level).filter(begins_within).collect();
-        let _view = self.reader.db.unchecked_transaction().with_activity("beginning to read")?;
+        let _view = self.reader.begin_view()?;
         let lines = means::format_lines(&self.reader.db, &due, self.settings.tick)?;
         let item = |(_, text): (TimeNs, String)| Some(line::parse(&text)?.into_item(0, RESENT_EPOCH, &self.by_number));
         Ok(lines.into_iter().filter_map(item).collect())
