@@ -1,4 +1,4 @@
-//! Laws of the cut that differ between lots, and at the ends of a pass.
+//! Laws of the cut that differ between lots.
 
 use super::find_effect;
 use super::law_tests::forms;
@@ -21,19 +21,4 @@ fn a_lot_that_no_form_names_is_cut_like_the_others_in_the_mean() {
     assert_eq!(at(5), [("gain_2", 0.0), ("gain_3", 0.0)], "the first lot is the reference");
     assert_eq!(at(15), [("gain_2", 300.0), ("gain_3", 0.0)]);
     assert_eq!(at(35), [("gain_2", 100.0), ("gain_3", 100.0)], "nobody has measured it");
-}
-
-#[test]
-fn a_cut_that_is_heavier_at_its_ends_has_a_form_of_its_own() {
-    let mut recording = Recording::new("passes", (0..200).map(|row| 0.1 * f64::from(row)).collect(), None);
-    set(&mut recording, "engaged", |row| f64::from(u8::from(row % 50 >= 10)));
-    set(&mut recording, "spindle_power_w", |_| 1.0);
-    let mut scene = scene(&recording, "spindle_power_w");
-    scene.set_load(Some((0..200).map(|row| if row % 50 >= 10 { 400.0 } else { 0.0 }).collect()));
-    let excess = forms("entry_exit", &scene).into_iter().find(|form| form.name == "excess").expect("proposed");
-    let columns = find_effect("entry_exit").expect("known").compute_columns(&scene, &excess).expect("columns");
-    assert_eq!((columns[0].0, columns[1].0), ("entry_excess", "exit_excess"));
-    let length_s = excess.shape_value("length_s").expect("a length");
-    assert!((columns[0].1[15] - 400.0 * f64::exp(-0.5 / length_s)).abs() < 1e-9, "half a second after contact");
-    assert!((columns[1].1[49] - 400.0).abs() < 1e-9 && columns[0].1[5] == 0.0);
 }

@@ -12,24 +12,10 @@ pub struct EntryExit;
 static DOC: EffectDoc = EffectDoc {
     kind: "entry_exit",
     family: "cutting",
-    law: "y = (entry * exp(-(t - t_entry) / T) + exit * exp(-(t_exit - t) / T)) * L in each pass; excess: the same with shares above zero; settling: y = settling * exp(-(t - t_entry) / T) * L; ramp: y = (entry * max(0, 1 - (t - t_entry) / T) + exit * max(0, 1 - (t_exit - t) / T_exit)) * L; travel: the same over the way s at the feed, from entry and to exit, in place of the time",
+    law: "y = (entry * exp(-(t - t_entry) / T) + exit * exp(-(t_exit - t) / T)) * L in each pass; settling: y = settling * exp(-(t - t_entry) / T) * L; ramp: y = (entry * max(0, 1 - (t - t_entry) / T) + exit * max(0, 1 - (t_exit - t) / T_exit)) * L; travel: the same over the way s at the feed, from entry and to exit, in place of the time",
     parameters: &[
         ParameterDoc::new_linear("entry", "1", (-1.0, 0.0), "share by which the cut differs on entry", "切入时的差异比例"),
         ParameterDoc::new_linear("exit", "1", (-1.0, 0.0), "share by which it differs on exit", "切出时的差异比例"),
-        ParameterDoc::new_linear(
-            "entry_excess",
-            "1",
-            (0.0, 1.0),
-            "share by which the cut is heavier on entry, where the first chips are thicker",
-            "切入时切屑较厚而增加的比例",
-        ),
-        ParameterDoc::new_linear(
-            "exit_excess",
-            "1",
-            (0.0, 1.0),
-            "share by which it is heavier on exit",
-            "切出时增加的比例",
-        ),
         ParameterDoc::new_linear(
             "settling",
             "1",
@@ -86,7 +72,7 @@ impl Effect for EntryExit {
     }
 
     fn form_names(&self) -> &'static [&'static str] {
-        &["ramp", TRAVEL, "settling", EXCESS]
+        &["ramp", TRAVEL, "settling"]
     }
 
     fn propose_forms(&self, scene: &Scene) -> Vec<Form> {
@@ -96,10 +82,7 @@ impl Effect for EntryExit {
         let longest_s = scene.passes().iter().map(|pass| compute_length_s(scene, pass)).fold(0.0, f64::max);
         let told = |length_s: &f64| (scene.period_s()..=longest_s / 3.0).contains(length_s);
         let lengths_s = || [1.0, 3.0, 10.0, 30.0].into_iter().filter(told);
-        let mut forms: Vec<Form> =
-            lengths_s().map(|length_s| Form::from_shape(&[("length_s", length_s)])).collect();
-        let short = EXCESSES_S.into_iter().filter(told);
-        forms.extend(short.map(|length_s| Form { name: EXCESS, ..Form::from_shape(&[("length_s", length_s)]) }));
+        let mut forms: Vec<Form> = lengths_s().map(|length_s| Form::from_shape(&[("length_s", length_s)])).collect();
         forms.extend([2.0, 6.0].into_iter().filter(told).flat_map(|length_s| build_entry_forms("ramp", TIMES, length_s)));
         forms.extend(list_entry_ways_mm(scene).into_iter().flat_map(|length_mm| build_entry_forms(TRAVEL, WAYS, length_mm)));
         // Over a good part of a pass nearly anything bends: only where another drive settles as well.
@@ -135,8 +118,7 @@ impl Effect for EntryExit {
         if form.name == "settling" {
             return Some(vec![("settling", multiply_cut(scene, |row| entry[row])?)]);
         }
-        let names = if form.name == EXCESS { ["entry_excess", "exit_excess"] } else { ["entry", "exit"] };
-        Some(vec![(names[0], multiply_cut(scene, |row| entry[row])?), (names[1], multiply_cut(scene, |row| exit[row])?)])
+        Some(vec![("entry", multiply_cut(scene, |row| entry[row])?), ("exit", multiply_cut(scene, |row| exit[row])?)])
     }
 
     fn reads_load(&self) -> bool {
@@ -150,12 +132,6 @@ impl Effect for EntryExit {
 
 /// Sampling periods from which on the entry is more than an edge: tool, chip and work settle over a good part of a pass.
 const SETTLING_PERIODS: f64 = 8.0;
-
-/// The form of a cut that is heavier at its ends: a tool that is fed straight into the work makes thicker chips until it is fully engaged
-/// (Sandvik Coromant, milling: entry into the cut).
-const EXCESS: &str = "excess";
-/// How long that lasts, s: a few turns of the work, or the way across a cutter. Over longer times a cut that is heavier at one end is a taper.
-const EXCESSES_S: [f64; 2] = [0.5, 2.0];
 
 /// Names of the lengths of entry and exit, as times and as ways.
 const TIMES: [&str; 2] = ["length_s", "exit_length_s"];
