@@ -197,12 +197,13 @@ fn lost_between(new: &Connection, after: i64) -> Result<DamagedRows, HistoryErro
 
 /// Summaries whose rows were lost, from the blocks.
 fn renew_summaries(new: &Connection, tables: &[RepairedTable]) -> Result<(), HistoryError> {
+    let writing = new.unchecked_transaction().with_activity("making summaries anew")?;
     for (name, minutes) in SUMMARIES {
         let lost = tables.iter().filter(|table| table.table == name).flat_map(|table| &table.lost);
         for (after, before) in lost {
             let range = after.saturating_mul(minutes)..before.saturating_add(1).saturating_mul(minutes);
-            pyramid::renew_buckets(new, pyramid::with_blocks(new, range)?)?;
+            pyramid::renew_buckets(&writing, pyramid::with_blocks(&writing, range)?)?;
         }
     }
-    Ok(())
+    writing.commit().with_activity("making summaries anew")
 }
