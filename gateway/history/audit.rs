@@ -116,9 +116,11 @@ fn noted_head(db: &Connection) -> Result<Option<(i64, String)>, rusqlite::Error>
 /// Appends a row, in the transaction of the caller.
 pub(crate) fn append_row(db: &Connection, audit: &Audit) -> Result<(), rusqlite::Error> {
     let (last, previous) = read_head(db)?;
-    let (number, audit) = (last + 1, audit.to_storable());
+    // The newest number is read from the file: one that a damaged file holds is an error, and no end of the thread that writes.
+    let next = last.checked_add(1).filter(|number| *number > 0);
+    let number = next.ok_or(rusqlite::Error::IntegralValueOutOfRange(0, last))?;
+    let audit = audit.to_storable();
     let hash = hash(&previous, number, &audit);
-    assert!(number > 0, "rows of the audit are numbered from 1: {number}");
     debug_assert!(previous.len() == BEGINNING.len() && hash.len() == BEGINNING.len(), "SHA-256 in hexadecimal");
     db.prepare_cached(
         "INSERT INTO audit (number, at_ns, kind, outcome, before, asked, after, unit, reason, script, script_version, person,

@@ -43,6 +43,8 @@
 //! `export` ask.
 
 mod audit;
+#[cfg(test)]
+mod audit_tests;
 mod block;
 mod commit;
 mod compact;

@@ -11,10 +11,16 @@ const ON_THE_WAY_S = 15;
 /** Between two lines of the hatching, and room that the words need, px. */
 const [HATCH_PX, WORDS_PX] = [7, 96];
 
+/** The usual wait of times that were asked about already: a chart asks for its gaps, then for what is not recorded. */
+const usualWaits = new WeakMap();
+
 function usualWait(x) {
   if (x.length <= WAITS_MIN) return 0;
-  const waits = x.slice(1).map((s, at) => s - x[at]);
-  return waits.sort((a, b) => a - b)[waits.length >> 1];
+  if (!usualWaits.has(x)) {
+    const waits = x.slice(1).map((s, at) => s - x[at]);
+    usualWaits.set(x, waits.sort((a, b) => a - b)[waits.length >> 1]);
+  }
+  return usualWaits.get(x);
 }
 
 /** The waits in these times that are gaps, as [last row before, first row after]. `least`: shorter ones never are. */

@@ -1,5 +1,5 @@
 // Below the charts: the parts of what is seen, the use of the machine by shift, day and week, alarms and writes.
-import { ask, fill, make, table } from "./parts.js";
+import { ask, fill, keyOf, make, table } from "./parts.js";
 import {
   clock,
   clockMinute,
@@ -41,11 +41,7 @@ export function stateLegend(context) {
   return make(
     "div",
     "legend",
-    STATE_ORDER.map((word) => {
-      const mark = make("i");
-      mark.style.background = `var(--${word})`;
-      return make("span", "", [mark, context.state(word)]);
-    }),
+    STATE_ORDER.map((word) => keyOf(word, context.state(word))),
   );
 }
 

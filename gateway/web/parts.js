@@ -31,6 +31,13 @@ export function say(element, text) {
   if (element.textContent !== wanted && element.textContent !== wanted.replaceAll("`", "")) write(element, wanted);
 }
 
+/** What a line of a chart is, in a legend: its colour, drawn as the line is, and words. */
+export function keyOf(line, words, shape = "") {
+  const mark = make("i", shape);
+  mark.style.setProperty("--mark", `var(--${line})`);
+  return make("span", "", [mark, words]);
+}
+
 export function card(title, content, className = "") {
   const box = make("section", `card ${className}`.trim());
   if (title) box.append(make("h2", "", title));

@@ -51,18 +51,21 @@ export const own = (thing) => localTimes(thing?.[chosen] ?? thing?.en ?? "");
 /** A change in the audit: the request, its answer, and what was done. */
 const CHANGE = /^([A-Z]+ \/\S+(?: from \S+)?(?: \(\d+\))?): (.+)$/s;
 
+/** Several sentences with semicolons between them; nothing where one of them is none. */
+function sentences(text) {
+  const parts = text.split("; ");
+  const all = parts.length > 1 ? parts.map(sentence) : [null];
+  return all.every(Boolean) ? all.join("；") : null;
+}
+
 /** What the box says in English, in Chinese where that is read: a whole sentence, or one of the gate, which is put together from
     known phrases. */
 export function box(text) {
   if (chosen !== "zh" || !text) return localTimes(text);
   const [, request, words] = CHANGE.exec(text) ?? [];
   if (request) return `${request}：${box(words)}`;
-  const whole = sentence(text);
-  if (whole) return localTimes(whole);
-  if (text.includes("; ")) {
-    const parts = text.split("; ");
-    if (parts.every((part) => sentence(part))) return localTimes(parts.map(sentence).join("；"));
-  }
+  const known = sentence(text) ?? sentences(text);
+  if (known) return localTimes(known);
   const ranges = localTimes(text).replace(/(\d) to (-?\d)/g, "$1 至 $2");
   return PHRASES.reduce((done, [en, zh]) => done.split(en).join(zh), ranges);
 }

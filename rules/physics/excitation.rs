@@ -1,7 +1,8 @@
 //! What a recording excites: levels, visits, boundaries and the grids of shapes worth trying in it.
 
 use super::{Effect, Form, Scene};
-use numerics::statistics::find_greatest_magnitude;
+use numerics::statistics::{count_to_f64, find_greatest_magnitude};
+use recording::Words;
 use std::collections::BTreeSet;
 
 /// Do the values differ by more than a thousandth of the greatest?
@@ -218,6 +219,26 @@ pub(crate) fn list_units(scene: &Scene, column: &str, most: usize) -> Option<(St
     let words = scene.text_column(column)?.words();
     let tellable = words.iter().all(|word| !word.contains(UNIT_TO_UNIT));
     ((2..=most).contains(&words.len()) && tellable).then(|| (column.to_owned(), words.join(UNIT_TO_UNIT)))
+}
+
+/// The units that a form names, and which rows are of which. A unit that nobody has measured yet is like the others in the mean.
+pub(crate) struct NamedUnits<'a> {
+    words: Option<&'a Words>,
+    pub(crate) names: Vec<&'a str>,
+}
+
+impl<'a> NamedUnits<'a> {
+    pub(crate) fn new(scene: &'a Scene, column: &str, names: Vec<&'a str>) -> Self {
+        Self { words: scene.text_column(column), names }
+    }
+
+    /// The share of a unit's term in a row: the whole of its own rows, an equal part where the row is of none that is named.
+    pub(crate) fn compute_share(&self, unit: &str, row: usize) -> f64 {
+        match self.words.and_then(|words| words.get(row)).filter(|word| self.names.contains(word)) {
+            Some(own) => f64::from(u8::from(own == unit)),
+            None => 1.0 / count_to_f64(self.names.len()),
+        }
+    }
 }
 
 /// The form without the units of its place that are not met; as it is where fewer than two are.

@@ -227,6 +227,11 @@ pub trait Effect: Sync + Send {
         false
     }
 
+    /// Does it act in the cut, so that it is multiplied by how far the tool is engaged?
+    fn acts_in_cut(&self) -> bool {
+        self.doc().family == "cutting"
+    }
+
     /// May a machine depart from it by a factor over another quantity? Not from what is the same whatever the machine does.
     fn may_depart(&self) -> bool {
         true

@@ -33,7 +33,7 @@ fn list_part_columns(scene: &Scene, part: &Part) -> Vec<String> {
             let needs = effect.doc().needs.iter().flat_map(|need| need.split('|')).map(str::trim);
             let needs = needs.filter_map(|need| Role::from_name(need).map_or_else(|| Some(need.to_owned()), role));
             // Whatever happens in the cut is multiplied by the engagement, where one is recorded.
-            let engagement = (part.is_cut() || effect.doc().family == "cutting").then(|| role(Role::Engaged)).flatten();
+            let engagement = (part.is_cut() || effect.acts_in_cut()).then(|| role(Role::Engaged)).flatten();
             needs.chain(engagement).collect()
         }
         _ => part.inputs().into_iter().map(str::to_owned).collect(),

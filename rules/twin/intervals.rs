@@ -33,8 +33,6 @@ const NOTICED: f64 = 0.05;
 const TELLS: f64 = 0.01;
 /// Units below which their disagreement says nothing.
 const UNITS_MIN: usize = 5;
-/// Kinds outside the family of the cut that mis-state it.
-const OF_THE_CUT: [&str; 1] = ["recipe_error"];
 
 /// A fit, and the rows that it was made from.
 pub(super) struct FittedRows<'a> {
@@ -104,9 +102,7 @@ impl FittedRows<'_> {
     /// for a part that does not change the cut.
     fn compute_load_loss_factor(&self, part: usize) -> f64 {
         let in_the_cut = |part: &Part| match &part.body {
-            PartFunction::Effect(effect, _) => {
-                effect.doc().family == "cutting" || OF_THE_CUT.contains(&part.kind.as_str())
-            }
+            PartFunction::Effect(effect, _) => effect.acts_in_cut(),
             _ => false,
         };
         let own = &self.fit.parts[..self.of_model];

@@ -1,6 +1,6 @@
 // Thermal error: what was measured, what the law predicts, what is left; the temperatures it is made of; offsets
 // proposed and written.
-import { ask, card, fill, make, row, say, table } from "/web/parts.js";
+import { ask, card, fill, keyOf, make, row, say, table } from "/web/parts.js";
 import { duration, folder, number, quantity } from "/web/format.js";
 import { t } from "/web/words.js";
 import { LINES, TimePlot } from "/web/plot.js";
@@ -13,13 +13,6 @@ const SPAN_LEAST_S = 60;
 /** A figure of fewer seconds is a dot. Until then it is read anew every second or so, afterwards every twenty. */
 const FIGURE_S = 10;
 const [READ_MS, READ_EARLY_MS] = [20000, 1500];
-
-/** A line of a figure in its legend. */
-function keyOf({ label, line }) {
-  const mark = make("i");
-  mark.style.background = `var(--${line})`;
-  return make("span", "", [mark, label]);
-}
 
 export function mount(root, context) {
   const now = make("div", "");
@@ -114,7 +107,10 @@ export function mount(root, context) {
       plot.give(data, recorded);
       plot.show(...drawn);
       plots.push(plot);
-      fill(errorKey, lines.map(keyOf));
+      fill(
+        errorKey,
+        lines.map(({ label, line }) => keyOf(line, label)),
+      );
       say(note, "");
     } else {
       fill(errorKey, []);
@@ -132,7 +128,10 @@ export function mount(root, context) {
     plot.show(...drawn);
     plots.push(plot);
     // Without values: the newest of the history are older than those above.
-    fill(list, warmths.map(keyOf));
+    fill(
+      list,
+      warmths.map(({ label, line }) => keyOf(line, label)),
+    );
   };
   let timer = null;
   const again = async () => {

@@ -1,6 +1,6 @@
 // Twin: the machine beside its simulation. What is watched, what differs, what the latest diagnosis says, what to try
 // next.
-import { ask, card, fill, make, row, say } from "/web/parts.js";
+import { ask, card, fill, keyOf, make, row, say } from "/web/parts.js";
 import { clock, number, printed, quantity, when } from "/web/format.js";
 import { box, own, t } from "/web/words.js";
 import { TimePlot } from "/web/plot.js";
@@ -56,11 +56,7 @@ export function mount(root, context) {
         [
           ["line-a", "recorded_value"],
           ["line-c", "simulated_value"],
-        ].map(([name, key]) => {
-          const mark = make("i");
-          mark.style.background = `var(--${name})`;
-          return make("span", "", [mark, t(key)]);
-        }),
+        ].map(([name, key]) => keyOf(name, t(key))),
       ),
       figure,
       make("h3", "", t("twin_residual")),

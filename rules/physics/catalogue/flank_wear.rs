@@ -1,10 +1,10 @@
 //! Friction on a worn flank: grows with the cutting time of the tool, starts again with a new edge.
 
 use crate::drive::is_displacement;
-use crate::excitation::{UNIT_TO_UNIT, list_units};
+use crate::excitation::{NamedUnits, UNIT_TO_UNIT, list_units};
 use crate::tool_load;
 use crate::{Effect, EffectDoc, Entry, Form, ParameterColumns, ParameterDoc, Role, Scene, Texts};
-use numerics::statistics::{count_to_f64, find_greatest_magnitude};
+use numerics::statistics::find_greatest_magnitude;
 use std::borrow::Cow;
 
 /// Friction between a worn flank and the work.
@@ -143,16 +143,9 @@ impl Effect for FlankWear {
         }
         let p = form.shape_value("p").unwrap_or(1.0);
         if form.name == "edges" {
-            let named: Vec<&str> = form.place.as_ref()?.1.split(UNIT_TO_UNIT).collect();
-            let tools = scene.text_column("tool");
-            let own = |row: usize| tools.and_then(|tools| tools.get(row)).filter(|tool| named.contains(tool));
-            // An edge that nobody has measured yet wears like the others in the mean.
-            let share = |edge: &str, row: usize| match own(row) {
-                Some(tool) => f64::from(u8::from(tool == edge)),
-                None => 1.0 / count_to_f64(named.len()),
-            };
-            let worn = |edge: &str| times(&|row| share(edge, row) * minutes[row].max(0.0).powf(p));
-            return Some(RATES.into_iter().zip(&named).map(|(rate, edge)| (rate, worn(edge))).collect());
+            let units = NamedUnits::new(scene, "tool", form.place.as_ref()?.1.split(UNIT_TO_UNIT).collect());
+            let worn = |edge: &str| times(&|row| units.compute_share(edge, row) * minutes[row].max(0.0).powf(p));
+            return Some(RATES.into_iter().zip(&units.names).map(|(rate, edge)| (rate, worn(edge))).collect());
         }
         Some(vec![("k", times(&|row| minutes[row].max(0.0).powf(p)))])
     }

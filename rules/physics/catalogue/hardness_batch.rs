@@ -2,10 +2,9 @@
 
 use crate::cut::{estimate_cut_load, multiply_cut};
 use crate::excitation::{
-    FOLLOWED, UNIT_TO_UNIT, compute_ln_count, find_run, list_units, follow_step_form, mark_rows_since_run, build_step_forms, mark_word_rows, mark_rows_within_runs, build_word_forms,
+    FOLLOWED, NamedUnits, UNIT_TO_UNIT, compute_ln_count, find_run, list_units, follow_step_form, mark_rows_since_run, build_step_forms, mark_word_rows, mark_rows_within_runs, build_word_forms,
 };
 use crate::{Bound, Effect, EffectDoc, Form, ParameterColumns, ParameterDoc, Scene, Texts};
-use numerics::statistics::count_to_f64;
 
 /// Hardness that differs between lots.
 #[derive(Debug, Clone, Copy)]
@@ -191,11 +190,9 @@ fn compute_recorded_lots(scene: &Scene, form: &Form) -> Option<ParameterColumns>
         Some((_, named)) => named.split(UNIT_TO_UNIT).collect(),
         None => lots.words().iter().map(String::as_str).collect(),
     };
-    let own = |row: usize| lots.get(row).filter(|lot| named.contains(lot));
-    let share = |lot: &str, row: usize| match own(row) {
-        Some(own) => f64::from(u8::from(own == lot)),
-        None => 1.0 / count_to_f64(named.len()),
+    let units = NamedUnits::new(scene, "lot", named);
+    let column = |(gain, lot): (&&'static str, &&str)| {
+        Some((*gain, multiply_cut(scene, |row| units.compute_share(lot, row))?))
     };
-    let column = |(gain, lot): (&&'static str, &&str)| Some((*gain, multiply_cut(scene, |row| share(lot, row))?));
-    GAINS.iter().zip(named.iter().skip(1)).map(column).collect()
+    GAINS.iter().zip(units.names.iter().skip(1)).map(column).collect()
 }

@@ -44,6 +44,10 @@ impl Effect for RecipeError {
         &DOC
     }
 
+    fn acts_in_cut(&self) -> bool {
+        true
+    }
+
     fn form_names(&self) -> &'static [&'static str] {
         &["word"]
     }

@@ -1,7 +1,8 @@
 //! Before a diagnosis is begun the page tells how much of the chosen time is recorded, and what little of it costs.
 
+use super::brought::open_twin;
 use super::browser::{self, Browser};
-use super::editing::{person, sign_in};
+use super::editing::person;
 use super::wear_view::answer_instead;
 use serde_json::json;
 use testkit::process::{Gateway, get};
@@ -21,9 +22,7 @@ fn little_history_is_told_before_a_diagnosis_is_begun_and_refuses_none() {
     let enough_s = get(&address, "/api/v1/diagnosis").json()["enough_s"].as_u64().expect("seconds");
     assert_eq!(enough_s, 45 * 60);
     let mut browser = Browser::start(directory.path());
-    browser.open(&format!("http://{address}/twin?lang=en"));
-    browser.wait_until("document.body?.dataset.fresh === 'yes'");
-    sign_in(&mut browser, "Li", &token);
+    open_twin(&mut browser, &address, &token);
     for (language, only, length) in [("en", "Only ", "45 min"), ("zh", "仅", "45 分")] {
         browser.open(&format!("http://{address}/twin?lang={language}"));
         browser.wait_until(&format!("document.body?.dataset.fresh === 'yes' && {TOLD}"));

@@ -1,5 +1,5 @@
 // Now: where the power of the spindle goes, at this moment and in the last ten minutes.
-import { ask, make, say } from "/web/parts.js";
+import { ask, keyOf, make, say } from "/web/parts.js";
 import { number, printed, quantity as shown } from "/web/format.js";
 import { t } from "/web/words.js";
 import { TimePlot } from "/web/plot.js";
@@ -119,14 +119,9 @@ const longestWait = (status) => WAIT_S * (status.speed ?? SPEED_MOST);
 
 /** What the two lines are, each as it is drawn. */
 function lineKey() {
-  const one = (line, key, shape) => {
-    const mark = make("i", shape);
-    mark.style.setProperty("--mark", `var(--${line})`);
-    return make("span", "", [mark, t(key)]);
-  };
   return make("div", "legend", [
-    one("line-a", "short_spindle_power_w", ""),
-    one("soft", "short_no_load_power_w", "dashed"),
+    keyOf("line-a", t("short_spindle_power_w")),
+    keyOf("soft", t("short_no_load_power_w"), "dashed"),
   ]);
 }
 

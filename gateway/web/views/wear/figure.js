@@ -1,6 +1,6 @@
 // Of the view "Tool wear": the limit of the cutting power against the measured power, part by part, and the edges one by one.
 import uPlot from "/web/uplot.js";
-import { colour, fill, make, say, table } from "/web/parts.js";
+import { colour, fill, keyOf, make, say, table } from "/web/parts.js";
 import { dateTime, number, quantity } from "/web/format.js";
 import { t } from "/web/words.js";
 
@@ -86,9 +86,7 @@ function legend(columns) {
   const drawn = Object.keys(LINES).filter((name) => columns[name].some((value) => value !== null));
   const marks = drawn.map((name) => {
     const [line, key, dash] = LINES[name];
-    const mark = make("i", dash ? "dashed" : "");
-    mark.style.setProperty("--mark", `var(--${line})`);
-    return make("span", "", [mark, t(key)]);
+    return keyOf(line, t(key), dash ? "dashed" : "");
   });
   return columns.limit.some((value) => value !== null) ? marks : [...marks, make("span", "", t("no_limit_in_figure"))];
 }
