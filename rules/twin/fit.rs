@@ -4,7 +4,8 @@
 //! the metric of the likeliest noise. Every number is computed over all rows; only those that the metric takes are fitted.
 
 use super::linear::{dot, least_squares};
-use super::model::{Part, Simulated, simulate_changed_part, simulate_parts};
+use super::model::{Part, Simulated, simulate_parts};
+use super::tangents::{Side, compute_tangents, has_kink};
 use numerics::statistics::{count_to_f64, rms};
 use physics::{Entry, Scene};
 
@@ -22,8 +23,6 @@ const SEEN: f64 = 1e-6;
 const AT_REST: f64 = 1e-10;
 /// Share of its value by which a shape may move in one step.
 const SHAPE_STEP: f64 = 0.5;
-/// Share of its value by which a parameter is moved to see what it does.
-const DIFFERENCE: f64 = 1e-4;
 /// Shares of a step that are tried.
 const SHARES: [f64; 6] = [1.0, 0.4, 0.16, 0.06, 0.025, 0.01];
 
@@ -76,8 +75,9 @@ pub(super) fn fit_parts(scene: &mut Scene, parts: &[Part], metric: &Metric<'_>) 
     let mut error = sum(&parts, &simulated.total);
     let (steps_max, dampings) =
         if metric.has_bounds { (BOUNDED_STEPS_MAX, &DAMPINGS[..]) } else { (STEPS_MAX, &DAMPINGS[..1]) };
+    let mut side = Side::Above;
     for _ in 0..steps_max {
-        let tangents = compute_tangents(scene, &parts, &free, &simulated)?;
+        let tangents = compute_tangents(scene, &parts, &free, (&simulated, side))?;
         let linear = Linearised::new(&parts, &free, metric, (&simulated.total, &tangents), ridge);
         let mut found = None;
         for damping in dampings {
@@ -87,14 +87,21 @@ pub(super) fn fit_parts(scene: &mut Scene, parts: &[Part], metric: &Metric<'_>) 
                 break;
             }
         }
-        let Some((moved, total, less)) = found else { break };
+        let Some((moved, total, less)) = found else {
+            if side == Side::Below || !has_kink(scene, &parts, &free, (&simulated, &tangents))? {
+                break;
+            }
+            side = Side::Below;
+            continue;
+        };
+        side = Side::Above;
         let gained = error - less;
         (parts, simulated, error) = (moved, total, less);
         if gained <= AT_REST * error {
             break;
         }
     }
-    let tangents = compute_tangents(scene, &parts, &free, &simulated)?;
+    let tangents = compute_tangents(scene, &parts, &free, (&simulated, Side::Above))?;
     let simulated = simulate_parts(&parts, scene)?.total;
     Some(Fit { parts, free, simulated, tangents })
 }
@@ -249,52 +256,6 @@ fn search_step_length(
     Some(None)
 }
 
-/// Change of the output with each free parameter: its own column where nothing else reads what it does, a difference
-/// quotient (exact where it is proportional) elsewhere.
-fn compute_tangents(scene: &mut Scene, parts: &[Part], free: &[Free], base: &Simulated) -> Option<Vec<Vec<f64>>> {
-    simulate_parts(parts, scene)?;
-    let mut columns: Vec<Option<Vec<f64>>> = vec![None; free.len()];
-    for (index, part) in parts.iter().enumerate() {
-        let direct = |free: &Free| free.part == index && has_column_derivative(parts, *free);
-        if !free.iter().any(direct) {
-            continue;
-        }
-        let known = part.compute_columns(scene)?;
-        for (position, free) in free.iter().enumerate().filter(|(_, free)| direct(free)) {
-            let name = &part.parameters[free.parameter].name;
-            let own = known.iter().find(|(known, _)| known == name).map(|(_, column)| column.clone());
-            columns[position] = Some(own.unwrap_or_else(|| vec![0.0; scene.rows()]));
-        }
-    }
-    for (position, free) in free.iter().enumerate() {
-        if columns[position].is_none() {
-            columns[position] = Some(compute_difference_quotient(scene, parts, *free, base)?);
-        }
-    }
-    columns.into_iter().collect()
-}
-
-/// Is the derivative simply the part's own column? Not where other parts read what this one simulates.
-fn has_column_derivative(parts: &[Part], free: Free) -> bool {
-    let part = &parts[free.part];
-    let linear = part.parameters[free.parameter].entry == Entry::Linear;
-    let coupled = parts.iter().any(Part::acts_on_output) && !part.acts_on_output();
-    linear && !coupled && !parts.iter().any(|other| part.is_read_by(other))
-}
-
-fn compute_difference_quotient(scene: &mut Scene, parts: &[Part], free: Free, base: &Simulated) -> Option<Vec<f64>> {
-    let mut moved = parts.to_vec();
-    let parameter = &mut moved[free.part].parameters[free.parameter];
-    let mut step = DIFFERENCE * parameter.value.abs().max(if parameter.entry == Entry::Shape { 1e-2 } else { 1e-6 });
-    if parameter.value + step > parameter.range.1 {
-        step = -step;
-    }
-    parameter.value += step;
-    let ahead = simulate_changed_part(&moved, scene, base, free.part)?;
-    simulate_parts(parts, scene)?;
-    Some(ahead.iter().zip(&base.total).map(|(ahead, base)| (ahead - base) / step).collect())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -349,5 +310,41 @@ mod tests {
         let metric = Metric { recorded: &recorded, weigh: &|column| column.to_vec(), has_bounds: true };
         let held = fit_parts(&mut scene, &outside, &metric).expect("every input is recorded");
         assert_eq!(held.parts[1].find_parameter("level").expect("a level").value, 0.0);
+    }
+
+    /// What a delay ends at that starts at so many whole rows: the recording is a force that comes this late, linear between two rows.
+    fn fit_delay(late_s: f64, started_rows: u32) -> f64 {
+        let force = |t: f64| 90.0 * (0.1 * t.cos() + 0.15 * (3.0 * t).cos()) + 20.0 * (7.0 * t).sin();
+        let mut text = String::from("time_s,one,force_n,simulated_n\n");
+        for row in 0..400_u32 {
+            let t = 0.05 * f64::from(row);
+            let rows = (t - late_s) / 0.05;
+            let (below, share) = (0.05 * rows.floor(), rows - rows.floor());
+            let late = (1.0 - share) * force(below) + share * force(below + 0.05);
+            writeln!(text, "{t},1,{late},{}", force(t)).expect("a string takes it");
+        }
+        let recording = read_csv(text.as_bytes(), "t.csv").expect("readable").recording;
+        let mut scene = Scene::new(&recording, "force_n", &Default::default()).expect("recorded");
+        let recorded = scene.recorded_output().to_vec();
+        let model = format!(
+            "schema = \"model/1\"\noutput = \"force_n\"\n[[effect]]\nkind = \"linear\"\ncolumns = {{ simulated_n = 1.0 }}\n\
+             [[effect]]\nkind = \"clock_lag\"\nparameters = {{ share = 1.0, delay_s = {} }}\nfixed = [\"share\"]\n",
+            0.05 * f64::from(started_rows)
+        );
+        let parts = parse_model(&model).expect("fine").parts;
+        let metric = Metric { recorded: &recorded, weigh: &|column| column[20..].to_vec(), has_bounds: true };
+        let fit = fit_parts(&mut scene, &parts, &metric).expect("every input is recorded");
+        fit.parts[1].find_parameter("delay_s").expect("a delay").value
+    }
+
+    #[test]
+    fn a_delay_does_not_rest_at_a_whole_row() {
+        for tenths in [22, 27, 34, 38, 41, 46] {
+            for started in [2, 3, 4, 5, 6] {
+                let late_s = 0.005 * f64::from(tenths);
+                let found = fit_delay(late_s, started);
+                assert!((found - late_s).abs() < 2e-4, "{late_s} s from {started} rows: {found} s");
+            }
+        }
     }
 }

@@ -41,7 +41,8 @@ mod robustness;
 pub mod simulate;
 pub mod speed_table;
 pub mod summary;
-pub mod term;
+pub mod tangents;
+mod term;
 pub mod text_report;
 mod thin;
 

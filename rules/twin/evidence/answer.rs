@@ -32,7 +32,7 @@ pub(super) struct Withdrawn {
     pub(super) errors: Option<(f64, f64)>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct EvidenceAnswer {
     pub(super) verdict: Verdict,
     /// Names, the most important first.

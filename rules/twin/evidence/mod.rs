@@ -10,9 +10,13 @@
 //! 6. Whether anything is there is one test (`existence.rs`). One rule decides what is told of it (`thresholds.rs`,
 //!    `validation.rs`, `naming_decision.rs`): probabilities averaged over resamples (`resampling.rs`), better on inner
 //!    parts of the fitted rows; rows that are held out only withdraw.
-//! 7. The nearest textbook law gives parameters, texts and the experiment (`report.rs`).
+//! 7. The names are written as a file: laws beside the refitted model (`written_law.rs`, `written_model.rs`), without those that it does not
+//!    need (`needless_names.rs`), compared with their rivals (`written_rivals.rs`). What the file leaves is searched once more
+//!    (`beside_written.rs`).
+//! 8. The file gives parameters, texts and the experiment (`report.rs`).
 
 mod answer;
+mod beside_written;
 mod contributions;
 mod cross_validation;
 mod existence;
@@ -27,6 +31,7 @@ mod linear_algebra;
 mod marginal;
 mod naming;
 mod naming_decision;
+mod needless_names;
 mod noise;
 mod noise_settings;
 mod outliers;
@@ -53,7 +58,7 @@ mod written_rivals;
 
 use super::diagnosis::{Diagnosis, Experiment, Rows, Verdict, find_output_unit};
 use super::fit::{Fit, Metric, fit_parts};
-use super::model::Model;
+use super::model::{Model, Part};
 use super::prepared_recording::Case;
 use super::summary;
 use adapter_core::bilingual::Bilingual;
@@ -90,17 +95,54 @@ pub fn diagnose_recording(recording: &Recording, model: &Model, seed: u64) -> Re
     if let Some(needed) = case.describe_missing_data(ROWS_MIN) {
         return Ok(build_undecided_diagnosis(&case, &needed));
     }
+    let parts = case.parts.clone();
+    let diagnosis = search_missing(&mut case, &parts, model, |case, found| {
+        let report = report::EvidenceReport {
+            recording,
+            case,
+            inputs: found.inputs,
+            baseline: found.baseline,
+            answer: found.answer,
+            comparison: found.comparison,
+            noise: found.noise,
+            recorded: &found.outliers.recorded,
+            ordinary: found.outliers.ordinary,
+            baseline_square: OnceCell::new(),
+        };
+        report.into_diagnosis()
+    });
+    Ok(diagnosis.unwrap_or_else(|| {
+        let needed = Bilingual::new("a model that can be fitted to this recording", "能对此记录拟合的模型");
+        build_undecided_diagnosis(&case, &needed)
+    }))
+}
+
+/// What a search has found beside some parts, and what it was found in.
+struct Found<'a> {
+    inputs: &'a RecordingInputs<'a>,
+    /// The parts as they were fitted without what is missing.
+    baseline: &'a Fit,
+    comparison: &'a Comparison<'a>,
+    outliers: &'a Outliers,
+    answer: EvidenceAnswer,
+    noise: NoiseModel,
+}
+
+/// Searches what is missing beside some parts, and tells it; `None` where the parts cannot be fitted to the recording.
+fn search_missing<'m, T>(
+    case: &mut Case<'m>,
+    parts: &[Part],
+    model: &Model,
+    tell: impl FnOnce(&mut Case<'m>, Found<'_>) -> T,
+) -> Option<T> {
     let fitted = case.list_fitted_rows();
     let recorded = case.scene.recorded_output().to_vec();
     let weigh = |column: &[f64]| -> Vec<f64> { fitted.iter().map(|row| column[*row]).collect() };
-    let parts = case.parts.clone();
     let mut scene = case.scene.clone();
     let metric = Metric { recorded: &recorded, weigh: &weigh, has_bounds: false };
-    let Some(baseline) = fit_parts(&mut scene, &parts, &metric) else {
-        let needed = Bilingual::new("a model that can be fitted to this recording", "能对此记录拟合的模型");
-        return Ok(build_undecided_diagnosis(&case, &needed));
-    };
-    let inputs = RecordingInputs::new(&scene, &case.units, &case.held, mark_comparable_rows(&scene, &baseline));
+    let baseline = fit_parts(&mut scene, parts, &metric)?;
+    let (units, held) = (case.units.clone(), case.held.clone());
+    let inputs = RecordingInputs::new(&scene, &units, &held, mark_comparable_rows(&scene, &baseline));
     let bank = families::build_bank(&inputs, model);
     let mut outliers = detect_outliers(&inputs, &bank, &baseline.tangents);
     outliers.dither_exact_output(&inputs);
@@ -108,19 +150,8 @@ pub fn diagnose_recording(recording: &Recording, model: &Model, seed: u64) -> Re
         ComparisonInput { tangents: &baseline.tangents, recorded: &outliers.recorded, scale: &outliers.scale };
     let first = Comparison::new(&inputs, &bank, &compared, ROWS_MAX);
     let (answer, noise) = infer_answer(&inputs, &first, &compared, &baseline, &outliers);
-    let report = report::EvidenceReport {
-        recording,
-        case: &mut case,
-        inputs: &inputs,
-        baseline: &baseline,
-        answer,
-        comparison: &first,
-        noise,
-        recorded: &outliers.recorded,
-        ordinary: outliers.ordinary,
-        baseline_square: OnceCell::new(),
-    };
-    Ok(report.into_diagnosis())
+    let found = Found { inputs: &inputs, baseline: &baseline, comparison: &first, outliers: &outliers, answer, noise };
+    Some(tell(case, found))
 }
 
 /// The diagnosis of a recording that does not suffice.

@@ -194,7 +194,7 @@ fn has_similar_form(named: &StandIn, other: &StandIn) -> bool {
 }
 
 /// Does the catalogue say of one of two laws that it is confused with the other?
-fn are_confused(a: &str, b: &str) -> bool {
+pub(super) fn are_confused(a: &str, b: &str) -> bool {
     let says = |a: &str, b: &str| find_effect(a).is_some_and(|effect| effect.doc().rivals.contains(&b));
     says(a, b) || says(b, a)
 }

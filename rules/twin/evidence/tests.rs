@@ -16,6 +16,16 @@ const ROWS: u32 = 250;
 
 /// Eight runs of a slide that goes to and fro at changing speeds, with dry friction of this level and a noise of 2 N.
 fn recorded(level_n: f64) -> String {
+    record_motion(&[(0.1, 1.3), (0.04, 4.1)], level_n, 0.0)
+}
+
+/// The same with quicker movements, and a meter that is late by so much.
+fn record_late(level_n: f64, late_s: f64) -> String {
+    record_motion(&[(0.1, 1.3), (0.04, 4.1), (0.02, 9.7), (0.008, 17.3)], level_n, late_s)
+}
+
+/// Movements as sines of these amplitudes (m/s) and angular frequencies (rad/s).
+fn record_motion(sines: &[(f64, f64)], level_n: f64, late_s: f64) -> String {
     let mut text = String::from("time_s,run,velocity_m_s,acceleration_m_s2,force_n\n");
     let mut state = 12_345_u64;
     let mut noise = || {
@@ -26,13 +36,14 @@ fn recorded(level_n: f64) -> String {
         }
         2.0 * (sum - 6.0)
     };
+    let velocity_m_s = |t: f64| sines.iter().map(|(size, w)| size * (w * t).sin()).sum::<f64>();
+    let acceleration_m_s2 = |t: f64| sines.iter().map(|(size, w)| size * w * (w * t).cos()).sum::<f64>();
     for row in 0..RUNS * ROWS {
         let t = f64::from(row) * 0.01;
-        let (slow, fast) = (1.3 * t, 4.1 * t);
-        let velocity = 0.1 * slow.sin() + 0.04 * fast.sin();
-        let acceleration = 0.13 * slow.cos() + 0.164 * fast.cos();
-        let force = 95.0 * acceleration + 215.0 * velocity + level_n * (velocity / 0.001).tanh() + noise();
-        writeln!(text, "{t},{},{velocity},{acceleration},{force}", row / ROWS).expect("a string takes it");
+        let (then, was) = (velocity_m_s(t - late_s), acceleration_m_s2(t - late_s));
+        let force = 95.0 * was + 215.0 * then + level_n * (then / 0.001).tanh() + noise();
+        writeln!(text, "{t},{},{},{},{force}", row / ROWS, velocity_m_s(t), acceleration_m_s2(t))
+            .expect("a string takes it");
     }
     text
 }
@@ -92,6 +103,21 @@ fn what_is_told_of_a_friction_is_what_its_file_does() {
     let found = check_told_is_written(&recorded(20.0), MODEL);
     let missing = &found.missing[0];
     assert!(missing.delta_ic.expect("fitted") > 0.0 && missing.probability.expect("named") > 0.5, "{missing:?}");
+}
+
+/// A delay between two values of the grid is made of two laws in the search; the file needs one.
+#[test]
+fn a_delay_between_two_values_of_the_grid_is_told_by_one_name() {
+    for late_s in [0.117, 0.186] {
+        let recording = read_csv(record_late(8.0, late_s).as_bytes(), "t.csv").expect("readable").recording;
+        let found = diagnose_recording(&recording, &parse_model(MODEL).expect("fine"), 1).expect("usable");
+        let names: Vec<&str> = found.missing.iter().map(|missing| missing.effect.as_str()).collect();
+        assert_eq!(names, ["clock_lag"], "{late_s} s: {}", found.debug);
+        let delay = found.missing[0].parameters.iter().find(|parameter| parameter.name == "delay_s").expect("a delay");
+        assert!((delay.value - late_s).abs() < 0.01, "{late_s} s: {delay:?}");
+        let alone = found.missing[0].delta_ic.expect("written");
+        assert!(alone > 0.0, "a name that is told is needed: {alone}");
+    }
 }
 
 /// Numbers with a lone 1 behind them, which is the unit of what has none: "1.3 1".

@@ -10,7 +10,6 @@ use crate::diagnosis::{UNKNOWN, Verdict};
 use crate::fit::Fit;
 use crate::model::Part;
 use crate::simulate::simulate_written_parts;
-use numerics::statistics::count_to_f64;
 
 /// Times that names are replaced by the nearest laws beside them.
 const REPLACED_MAX: usize = 3;
@@ -38,7 +37,8 @@ impl EvidenceReport<'_, '_> {
     /// Names whose file is possible and lowers the error of the rows that are told: a name that is not, or does not, gives way to the nearest
     /// law beside it, and in the end to something without a name.
     pub(super) fn settle_names(&mut self) -> (Textbook, Option<WrittenModel>) {
-        let mut textbook = self.fit_textbook_laws();
+        let textbook = self.fit_textbook_laws();
+        let mut textbook = self.drop_needless_names(textbook);
         for attempt in 0..=REPLACED_MAX {
             let mut refused = self.list_refused_names(&textbook);
             if refused.is_empty() {
@@ -75,13 +75,17 @@ impl EvidenceReport<'_, '_> {
         self.compute_told_rmse(total).unwrap_or(f64::INFINITY)
     }
 
+    /// Share of what the curve gains that the file keeps.
+    pub(super) fn compute_kept_share(&self, written: &WrittenModel) -> f64 {
+        let (before, curve) =
+            (self.compute_told_error(&self.inputs.simulated), self.compute_told_error(&self.answer.after));
+        (before - self.compute_told_error(&written.total)) / (before - curve).max(f64::MIN_POSITIVE)
+    }
+
     /// What is told is what the file does: the free curve is the ceiling only. A law that keeps little of what the curve gains stands beside
     /// something without a name, and so does a name that nothing can be written for.
     pub(super) fn tell_written_model(&mut self, textbook: &Textbook, written: WrittenModel) -> WrittenModel {
-        let (before, curve) =
-            (self.compute_told_error(&self.inputs.simulated), self.compute_told_error(&self.answer.after));
-        let law = self.compute_told_error(&written.total);
-        let kept = (before - law) / (before - curve).max(f64::MIN_POSITIVE);
+        let kept = self.compute_kept_share(&written);
         let lawless = self.answer.names.iter().zip(&textbook.laws).filter(|(_, law)| law.is_none());
         let lawless: Vec<String> = lawless.map(|(name, _)| name.clone()).collect();
         if kept < THRESHOLDS.kept_share {
@@ -132,11 +136,7 @@ impl EvidenceReport<'_, '_> {
     /// What the law of a name is worth: the others refitted without it.
     pub(super) fn measure_own_figures(&mut self, fit: &Fit, place: usize) -> Option<OwnFigures> {
         let without = self.fit_without(fit, place)?;
-        let rows = count_to_f64(self.comparison.rows.len());
-        let parameters = count_to_f64(fit.free.len().saturating_sub(without.free.len()));
-        let squares = |fit: &Fit| self.sum_left_squares(fit).max(f64::MIN_POSITIVE);
-        let likelihood = rows * (squares(&without) / squares(fit)).ln();
-        let information = self.comparison.tempering * likelihood - parameters * (self.comparison.tempering * rows).ln();
+        let information = self.compare_information(fit, &without);
         let written = self.write_fit(&without)?;
         Some(OwnFigures { information, error_without: self.compute_told_rmse(&written.total) })
     }

@@ -13,12 +13,13 @@ use crate::diagnosis::{UNKNOWN, Verdict};
 use crate::model::Part;
 use numerics::statistics::count_to_f64;
 
-/// Rivals that are written and compared, at most, the likeliest first: each takes as long as the fit of what is told.
+/// Rivals that are written and compared, at most, the likeliest first: each takes as long as the fit of what is told, once in the place of
+/// each name.
 const RIVALS_MAX: usize = 4;
 
 /// How well a file predicts.
 #[derive(Debug, Clone, Copy)]
-struct WrittenPrediction {
+pub(super) struct WrittenPrediction {
     /// Logarithmic likelihood of rows left out, nats, but for a constant.
     log_likelihood: f64,
     /// Root mean square error of the rows that are told.
@@ -27,7 +28,7 @@ struct WrittenPrediction {
 
 impl WrittenPrediction {
     /// Nats by which rows left out are likelier than with `other`; zero where the rows that are told say the opposite.
-    fn compute_lead(self, other: Self) -> f64 {
+    pub(super) fn compute_lead(self, other: Self) -> f64 {
         let lead = self.log_likelihood - other.log_likelihood;
         let agrees = (other.error - self.error) * lead > 0.0;
         if agrees { lead } else { 0.0 }
@@ -68,7 +69,7 @@ impl EvidenceReport<'_, '_> {
         told
     }
 
-    fn measure_prediction(&self, textbook: &Textbook, written: &WrittenModel) -> Option<WrittenPrediction> {
+    pub(super) fn measure_prediction(&self, textbook: &Textbook, written: &WrittenModel) -> Option<WrittenPrediction> {
         let square = self.prepare_left_out(textbook.fit.as_ref()?).compute_square().max(f64::MIN_POSITIVE);
         let rows = self.comparison.tempering * count_to_f64(self.comparison.rows.len());
         Some(WrittenPrediction {
