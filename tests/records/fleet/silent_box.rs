@@ -2,7 +2,7 @@
 
 use adapters::{Absence, ChannelId, Sample, Slot, Value};
 use gateway::history::{
-    Alarm, AlarmClear, Event, ExtraSeries, ExtraValue, Options, Part, StateChange, WhenFull, Writer,
+    Alarm, AlarmClear, Event, ExtraSeries, ExtraValue, Options, Part, Retention, StateChange, WhenFull, Writer,
 };
 use std::path::Path;
 
