@@ -102,6 +102,13 @@ impl MachinePath {
         self.words.join(".")
     }
 
+    /// For identifiers that take neither slash nor point: `shanghai_line-2_lathe-7`. An underscore of a word is doubled, and no word begins with
+    /// one, so that two paths never have the same.
+    #[must_use]
+    pub fn format_underscored(&self) -> String {
+        self.words.iter().map(|word| word.replace('_', "__")).collect::<Vec<_>>().join("_")
+    }
+
     /// The levels before the machine with points: `shanghai.line-2`.
     #[must_use]
     pub fn format_group(&self) -> String {

@@ -3,12 +3,14 @@
 use super::{CannotRun, CommandOutcome, CommandResult, load_configuration, print_text};
 use crate::config::Config;
 use crate::history::{Item, Outbox, OutboxReader, Reader, ResentItems, box_id};
+use crate::log::{Notice, Severity};
 use crate::moment;
 use crate::sinks::Resender;
 use adapters::clock::TimeNs;
 use clap::Args;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::time::Duration;
 use tokio::sync::mpsc::channel;
 
 #[derive(Debug, Args)]
@@ -29,6 +31,9 @@ pub(super) struct ResendArguments {
     #[arg(long, default_value_t = 2000.0, value_name = "ITEMS")]
     rate: f64,
 }
+
+/// How often it tells how far it is.
+const TELL_EVERY: Duration = Duration::from_secs(60);
 
 fn to_cannot_run(error: impl std::fmt::Display) -> CannotRun {
     CannotRun::new(error.to_string(), "")
@@ -84,8 +89,21 @@ pub(super) async fn resend_stretch(arguments: &ResendArguments) -> CommandResult
         })
     });
     let began = std::time::Instant::now();
+    let mut told = began;
     while let Some(piece) = made.recv().await {
-        resender.send_items(&piece).await.map_err(to_cannot_run)?;
+        let reached = moment::format_utc(piece.first().map_or(from_ns, |item| item.at_ns));
+        resender.send_items(&piece).await.map_err(|error| {
+            let (what, next) = error.as_parts();
+            CannotRun::new(
+                format!("{what}; everything before {reached} is sent"),
+                format!("{next}; then go on with --from {reached}"),
+            )
+        })?;
+        if told.elapsed() >= TELL_EVERY {
+            told = std::time::Instant::now();
+            let text = format!("{} items sent, up to {reached}", resender.sent_count);
+            Notice::new(Severity::Info, "resend", text).write_to_logs();
+        }
     }
     resender.close().await;
     reading.await.map_err(to_cannot_run)?.map_err(to_cannot_run)?;

@@ -4,26 +4,34 @@ use super::means;
 use super::row::FleetRow;
 use serde_json::{Map, Value as Json, json};
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
+
+/// A value as its row has it, or why there is none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum LatestCell<'r> {
+    Number(f64),
+    Text(&'r str),
+    Missing(&'r str),
+}
 
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct LatestOfBox {
+pub(super) struct LatestOfBox<'r> {
     /// The oldest of the values.
     pub(super) first_us: i64,
     pub(super) last_us: i64,
     pub(super) arrived_us: i64,
     pub(super) sequence: i64,
-    /// Time and value, or no value and why, by series.
-    cells: BTreeMap<i32, (i64, Json, Option<String>)>,
+    /// Time and value by series.
+    cells: BTreeMap<i32, (i64, LatestCell<'r>)>,
 }
 
-impl LatestOfBox {
+impl LatestOfBox<'_> {
     /// Time and value by number of the series, as in `{"12":[microseconds,2249.5],"13":[microseconds,null,"stale"]}`.
     pub(super) fn to_json(&self) -> String {
-        let cell = |(id, (at_us, value, reason)): (&i32, &(i64, Json, Option<String>))| {
-            let cell = match reason {
-                None => json!([at_us, value]),
-                Some(reason) => json!([at_us, value, reason]),
+        let cell = |(id, (at_us, cell)): (&i32, &(i64, LatestCell<'_>))| {
+            let cell = match cell {
+                LatestCell::Number(number) => json!([at_us, number]),
+                LatestCell::Text(text) => json!([at_us, text]),
+                LatestCell::Missing(reason) => json!([at_us, null, reason]),
             };
             (id.to_string(), cell)
         };
@@ -33,13 +41,13 @@ impl LatestOfBox {
 
 /// Of all boxes of a batch, by their numbers.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Latest {
-    pub(super) boxes: BTreeMap<i32, LatestOfBox>,
+pub(super) struct Latest<'r> {
+    pub(super) boxes: BTreeMap<i32, LatestOfBox<'r>>,
 }
 
-impl Latest {
+impl<'r> Latest<'r> {
     /// Takes the cells of a row on, whose series have these numbers: those of numbers, texts and missing values in this order.
-    pub(super) fn add(&mut self, box_id: i32, row: &FleetRow<'_>, series: &[i32], arrived_us: i64) {
+    pub(super) fn add(&mut self, box_id: i32, row: &'r FleetRow<'_>, series: &[i32], arrived_us: i64) {
         let at_us = row.at_us();
         // What is told of a time that is over says nothing about now.
         let live = row.kind != "gap" && means::LEVELS.iter().all(|level| *level.kind != *row.kind);
@@ -58,14 +66,13 @@ impl Latest {
         }
         latest.first_us = latest.first_us.min(at_us);
         latest.last_us = latest.last_us.max(at_us);
-        let numbers = row.numbers.iter().map(|(_, number)| (json!(number), None));
-        let texts = row.texts.iter().map(|(_, text)| (json!(text), None));
-        let missing = row.missing.iter().map(|(_, reason)| (Json::Null, Some(reason.to_string())));
-        for (id, (value, reason)) in series.iter().zip(numbers.chain(texts).chain(missing)) {
-            match latest.cells.entry(*id) {
-                Entry::Occupied(known) if known.get().0 > at_us => {}
-                Entry::Occupied(mut known) => drop(known.insert((at_us, value, reason))),
-                Entry::Vacant(free) => drop(free.insert((at_us, value, reason))),
+        let numbers = row.numbers.iter().map(|(_, number)| LatestCell::Number(*number));
+        let texts = row.texts.iter().map(|(_, text)| LatestCell::Text(text));
+        let missing = row.missing.iter().map(|(_, reason)| LatestCell::Missing(reason));
+        for (id, cell) in series.iter().zip(numbers.chain(texts).chain(missing)) {
+            let known = latest.cells.entry(*id).or_insert((at_us, cell));
+            if known.0 <= at_us {
+                *known = (at_us, cell);
             }
         }
     }

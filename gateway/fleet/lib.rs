@@ -7,10 +7,10 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `row` | a message as a row; pure |
+//! | `row`, `field` | a message as a row, and its cells; pure |
 //! | `copy` | rows in the binary format of `COPY`; pure |
 //! | `latest`, `means` | the newest values, and the means of minutes, hours and days, of a batch; pure |
-//! | `names` | the numbers of boxes and series, and machines that get another name |
+//! | `names` | rows with the numbers of their boxes and series, and machines that get another name |
 //! | `write` | a batch in one transaction |
 //! | `schema` | tables, their version, partitions; the SQL is in the folder `schema` |
 //! | `database`, `tls_connection` | the connection, what it says in words, TLS |
@@ -20,6 +20,7 @@
 
 mod copy;
 mod database;
+mod field;
 pub mod ingest;
 mod known_items;
 mod latest;

@@ -1,7 +1,7 @@
 //! The numbers that boxes and series have in the database, and at which machine each box stands.
 
 use super::database::DatabaseError;
-use super::row::SeriesName;
+use super::row::{FleetRow, SeriesName};
 use crate::row::Arrived;
 use gateway_base::machine_path::MachinePath;
 use std::collections::HashMap;
@@ -10,6 +10,16 @@ use tokio_postgres::types::ToSql;
 
 /// Names that are remembered; beyond that they are asked for again. A thousand boxes of a hundred series each.
 const REMEMBERED_MAX: usize = 100_000;
+
+/// A row with the numbers of its box and, in the order of its cells, of its series.
+#[derive(Debug)]
+pub(super) struct NumberedRow<'r> {
+    pub(super) row: &'r FleetRow<'r>,
+    /// When the stream had the row, microseconds since 1970.
+    pub(super) arrived_us: i64,
+    pub(super) box_id: i32,
+    pub(super) series: Vec<i32>,
+}
 
 #[derive(Debug, Default)]
 pub(super) struct Names {
@@ -27,49 +37,61 @@ impl Names {
     }
 
     /// The number of a series that has been learnt.
-    pub(super) fn series_id(&self, series: &SeriesName<'_>) -> Option<i32> {
+    fn series_id(&self, series: &SeriesName<'_>) -> Option<i32> {
         let units = self.series.get(&*series.name)?;
         units.iter().find(|(unit, _)| *unit == series.unit).map(|(_, id)| *id)
     }
 
-    /// Asks for what is not known yet, and notes a machine that has another name now.
-    pub(super) async fn resolve_names(&mut self, client: &Client, rows: &[Arrived<'_>]) -> Result<(), DatabaseError> {
+    /// The rows with their numbers. Asks for what is not known yet, and notes a machine that has another name now.
+    pub(super) async fn number_rows<'r>(
+        &mut self,
+        client: &Client,
+        rows: &[Arrived<'r>],
+    ) -> Result<Vec<NumberedRow<'r>>, DatabaseError> {
         if self.boxes.len() > REMEMBERED_MAX || self.series.len() > REMEMBERED_MAX {
             *self = Self::default();
         }
         let naming = |error| DatabaseError::new("naming boxes and series", &error);
-        for Arrived { row, .. } in rows {
-            let known = self.boxes.get(&*row.box_name).is_some_and(|(_, machine)| *machine == row.machine);
-            if !known {
-                let found = client
-                    .query_one(NAME_BOX, &[&&*row.box_name, &&*row.machine, &row.at_us()])
-                    .await
-                    .map_err(naming)?;
-                self.boxes.insert(row.box_name.to_string(), (found.get(0), row.machine.to_string()));
-            }
+        let mut numbered = Vec::with_capacity(rows.len());
+        for Arrived { row, arrived_us } in rows {
+            let box_id = match self.boxes.get(&*row.box_name) {
+                Some((id, machine)) if *machine == row.machine => *id,
+                _ => {
+                    let named = client.query_one(NAME_BOX, &[&&*row.box_name, &&*row.machine, &row.at_us()]).await;
+                    let id = named.map_err(naming)?.get(0);
+                    self.boxes.insert(row.box_name.to_string(), (id, row.machine.to_string()));
+                    id
+                }
+            };
             // What comes late was made at a time of which the box does not say where it stood.
             if !row.historical && self.places.get(&*row.box_name) != Some(&row.path) {
-                let box_id = self.box_id(&row.box_name);
                 note_place(client, box_id, row.path.as_ref(), row.at_us()).await.map_err(naming)?;
                 self.places.insert(row.box_name.to_string(), row.path.clone());
             }
-            for series in row.series_names() {
-                if self.series_id(series).is_none() {
-                    let found =
-                        client.query_one(NAME_SERIES, &[&&*series.name, &&*series.unit]).await.map_err(naming)?;
-                    let units = self.series.entry(series.name.to_string()).or_default();
-                    units.push((series.unit.to_string(), found.get(0)));
-                }
+            let mut series =
+                Vec::with_capacity(row.numbers.len() + row.texts.len() + row.missing.len() + row.means.len());
+            for named in row.series_names() {
+                series.push(match self.series_id(named) {
+                    Some(id) => id,
+                    None => self.name_series(client, named).await.map_err(naming)?,
+                });
             }
+            numbered.push(NumberedRow { row, arrived_us: *arrived_us, box_id, series });
         }
-        Ok(())
+        Ok(numbered)
+    }
+
+    async fn name_series(&mut self, client: &Client, series: &SeriesName<'_>) -> Result<i32, tokio_postgres::Error> {
+        let id = client.query_one(NAME_SERIES, &[&&*series.name, &&*series.unit]).await?.get(0);
+        self.series.entry(series.name.to_string()).or_default().push((series.unit.to_string(), id));
+        Ok(id)
     }
 }
 
 /// Notes at which machine a box stands from this time on, where that is another one than before.
 async fn note_place(
     client: &Client,
-    box_id: Option<i32>,
+    box_id: i32,
     path: Option<&MachinePath>,
     at_us: i64,
 ) -> Result<(), tokio_postgres::Error> {

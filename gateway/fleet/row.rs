@@ -1,5 +1,6 @@
 //! A message of the stream as a row. Pure.
 
+use super::field::{FieldValue, ValueInItem};
 use adapters::clock::TimeNs;
 use gateway_base::machine_path::MachinePath;
 use gateway_history::{NOT_RUNNING, parse_nested_json};
@@ -82,41 +83,16 @@ struct ItemDocument<'a> {
     historical: bool,
 }
 
-#[derive(Deserialize)]
-struct FieldValue<'a> {
-    #[serde(borrow)]
-    name: Cow<'a, str>,
-    #[serde(default, borrow)]
-    value: ValueInItem<'a>,
-    #[serde(default, borrow)]
-    unit: Cow<'a, str>,
-    #[serde(default, borrow)]
-    missing: Option<Cow<'a, str>>,
-    #[serde(default)]
-    mean: Option<f64>,
-    #[serde(default)]
-    least: Option<f64>,
-    #[serde(default)]
-    greatest: Option<f64>,
-    #[serde(default)]
-    seconds: Option<f64>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(untagged)]
-enum ValueInItem<'a> {
-    Number(f64),
-    Text(#[serde(borrow)] Cow<'a, str>),
-    #[default]
-    Missing,
-}
-
 fn refuse_message<T>(what: impl Into<String>) -> Result<T, RefusedMessage> {
     Err(RefusedMessage(what.into()))
 }
 
 /// Names become rows of their own and titles of charts.
 fn check_name<'a>(what: &str, name: Cow<'a, str>) -> Result<Cow<'a, str>, RefusedMessage> {
+    // Most names are plain, and each value has one.
+    if (1..=NAME_MAX).contains(&name.len()) && name.bytes().all(|letter| matches!(letter, b' '..=b'~')) {
+        return Ok(name);
+    }
     if name.is_empty() || name.contains(char::is_control) {
         return refuse_message(format!("the name of the {what} is empty or holds a control character"));
     }

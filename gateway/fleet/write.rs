@@ -5,7 +5,7 @@ use super::database::{self, DatabaseError, DatabaseSettings};
 use super::known_items::KnownItems;
 use super::latest::Latest;
 use super::means::{self, MeanRows};
-use super::names::Names;
+use super::names::{Names, NumberedRow};
 use super::redate::{self, KnownMoves, MovesOfBatch};
 use super::row::FleetRow;
 use super::schema::{self, Partition, Partitioning};
@@ -85,20 +85,17 @@ impl Database {
     }
 
     /// Writes the rows, whose times are settled, in one transaction; nothing is written where it fails.
-    pub(super) async fn write(&mut self, rows: &mut [Arrived<'_>]) -> Result<BatchResult, DatabaseError> {
+    pub(super) async fn write(&mut self, rows: &[Arrived<'_>]) -> Result<BatchResult, DatabaseError> {
         if rows.is_empty() {
             return Ok(BatchResult::default());
         }
-        self.names.resolve_names(&self.client, rows).await?;
-        let given = rows.len() as u64;
-        let mut rows = self.leave_out_known(rows).await?;
-        let left_out = given - rows.len() as u64;
+        let mut numbered = self.names.number_rows(&self.client, rows).await?;
+        self.leave_out_known(&mut numbered).await?;
+        let left_out = (rows.len() - numbered.len()) as u64;
         // Several write at a time: the same order everywhere leaves no two that wait for each other.
-        rows.sort_by(|a, b| {
-            (&a.row.box_name, a.row.at_ns, a.row.sequence).cmp(&(&b.row.box_name, b.row.at_ns, b.row.sequence))
-        });
-        let told = MovesOfBatch::from_rows(rows.iter().map(|arrived| arrived.row));
-        let (encoded, moves) = (self.encode_rows(&rows, &told), !told.is_empty());
+        numbered.sort_unstable_by_key(|one| (one.box_id, one.row.at_ns, one.row.sequence));
+        let told = MovesOfBatch::from_rows(numbered.iter().map(|one| one.row));
+        let (encoded, moves) = (encode_rows(&numbered, &told), !told.is_empty());
         self.create_missing_partitions(&encoded.partitions).await?;
         let mut transaction = self.client.transaction().await.map_err(writing_error)?;
         if !self.moves.lock(&transaction, moves).await? {
@@ -125,10 +122,11 @@ impl Database {
     }
 
     /// Leaves out items that were made from a history once more where the database has them as they were sent first.
-    async fn leave_out_known<'r>(&self, rows: &[Arrived<'r>]) -> Result<Vec<Arrived<'r>>, DatabaseError> {
+    async fn leave_out_known(&self, rows: &mut Vec<NumberedRow<'_>>) -> Result<(), DatabaseError> {
         let mut known = KnownItems::default();
-        known.load(&self.client, &self.names, rows.iter().map(|arrived| arrived.row)).await?;
-        Ok(rows.iter().filter(|arrived| !known.holds(arrived.row)).copied().collect())
+        known.load(&self.client, &self.names, rows.iter().map(|one| one.row)).await?;
+        rows.retain(|one| !known.holds(one.row));
+        Ok(())
     }
 
     /// Notes what is not taken.
@@ -141,46 +139,6 @@ impl Database {
         Ok(())
     }
 
-    fn encode_rows(&self, rows: &[Arrived<'_>], moves: &MovesOfBatch<'_>) -> Encoded {
-        let (mut items, mut records) = (CopyRows::new(), CopyRows::new());
-        let (mut latest, mut of_levels) = (Latest::default(), [const { None::<MeanRows> }; means::LEVELS.len()]);
-        let mut times = BTreeSet::new();
-        for Arrived { row, arrived_us } in rows {
-            let Some(box_id) = self.names.box_id(&row.box_name) else { continue };
-            let series: Vec<i32> = row.series_names().filter_map(|series| self.names.series_id(series)).collect();
-            let record = row.record.as_ref().map(serde_json::Value::to_string);
-            put_item(&mut items, row, (box_id, *arrived_us), &series, record.as_deref());
-            times.insert(("items", day_of(row.at_us())));
-            if let Some(record) = &record {
-                let place = records
-                    .begin_row(6)
-                    .append_int4(box_id)
-                    .append_int8(row.epoch)
-                    .append_int8(row.sequence)
-                    .append_time(row.at_us());
-                place.append_text(&row.kind).append_json(Some(record));
-                times.extend(RECORD_TABLES.iter().map(|table| (*table, day_of(row.at_us()))));
-                let gap = row.record.as_ref().filter(|_| row.kind == "gap");
-                let until_us = gap.and_then(|record| record["until_ns"].as_i64()).map(|ns| ns / 1000);
-                times.extend(until_us.map(|until_us| ("state_list", day_of(until_us))));
-            }
-            latest.add(box_id, row, &series, *arrived_us);
-            if moves.hold(row) {
-                continue;
-            }
-            for (level, rows) in means::LEVELS.iter().zip(&mut of_levels).filter(|(level, _)| *level.kind == *row.kind)
-            {
-                rows.get_or_insert_default().add(level, box_id, row, &series);
-                times.insert((level.table, day_of(row.at_us())));
-            }
-        }
-        let of_time = |(table, day): (&str, i64)| schema::find_partitioned(table)?.partition_at(day * DAY_US);
-        let partitions = times.into_iter().filter_map(of_time).collect();
-        let of_level = |(level, rows): (&'static means::MeanLevel, Option<MeanRows>)| Some((level, copy_means(&rows?)));
-        let means = means::LEVELS.iter().zip(of_levels).filter_map(of_level).collect();
-        Encoded { items, records, latest: copy_latest(&latest), means, partitions }
-    }
-
     async fn create_missing_partitions(&mut self, wanted: &BTreeSet<Partition>) -> Result<(), DatabaseError> {
         let missing: BTreeSet<Partition> = wanted.difference(&self.partitions).cloned().collect();
         if self.partitioning == Partitioning::Timescale || missing.is_empty() {
@@ -190,6 +148,44 @@ impl Database {
         self.partitions.extend(missing);
         Ok(())
     }
+}
+
+fn encode_rows(rows: &[NumberedRow<'_>], moves: &MovesOfBatch<'_>) -> Encoded {
+    let (mut items, mut records) = (CopyRows::new(), CopyRows::new());
+    let (mut latest, mut of_levels) = (Latest::default(), [const { None::<MeanRows> }; means::LEVELS.len()]);
+    let mut times = BTreeSet::new();
+    for NumberedRow { row, arrived_us, box_id, series } in rows {
+        let (arrived_us, box_id) = (*arrived_us, *box_id);
+        let record = row.record.as_ref().map(serde_json::Value::to_string);
+        put_item(&mut items, row, (box_id, arrived_us), series, record.as_deref());
+        times.insert(("items", day_of(row.at_us())));
+        if let Some(record) = &record {
+            let place = records
+                .begin_row(6)
+                .append_int4(box_id)
+                .append_int8(row.epoch)
+                .append_int8(row.sequence)
+                .append_time(row.at_us());
+            place.append_text(&row.kind).append_json(Some(record));
+            times.extend(RECORD_TABLES.iter().map(|table| (*table, day_of(row.at_us()))));
+            let gap = row.record.as_ref().filter(|_| row.kind == "gap");
+            let until_us = gap.and_then(|record| record["until_ns"].as_i64()).map(|ns| ns / 1000);
+            times.extend(until_us.map(|until_us| ("state_list", day_of(until_us))));
+        }
+        latest.add(box_id, row, series, arrived_us);
+        if moves.hold(row) {
+            continue;
+        }
+        for (level, rows) in means::LEVELS.iter().zip(&mut of_levels).filter(|(level, _)| *level.kind == *row.kind) {
+            rows.get_or_insert_default().add(level, box_id, row, series);
+            times.insert((level.table, day_of(row.at_us())));
+        }
+    }
+    let of_time = |(table, day): (&str, i64)| schema::find_partitioned(table)?.partition_at(day * DAY_US);
+    let partitions = times.into_iter().filter_map(of_time).collect();
+    let of_level = |(level, rows): (&'static means::MeanLevel, Option<MeanRows>)| Some((level, copy_means(&rows?)));
+    let means = means::LEVELS.iter().zip(of_levels).filter_map(of_level).collect();
+    Encoded { items, records, latest: copy_latest(&latest), means, partitions }
 }
 
 /// Tables of records that are partitioned by the time of the record.
@@ -238,7 +234,7 @@ fn copy_means(rows: &MeanRows) -> CopyRows {
     copied
 }
 
-fn copy_latest(latest: &Latest) -> CopyRows {
+fn copy_latest(latest: &Latest<'_>) -> CopyRows {
     let mut copied = CopyRows::new();
     for (box_id, one) in &latest.boxes {
         copied.begin_row(6).append_int4(*box_id).append_time(one.first_us);

@@ -1,4 +1,4 @@
-//! `parquet:DIRECTORY`: every night the finished day as files of columns, for a data lake.
+//! `parquet:DIRECTORY`: every night the finished day as files of columns, for a data lake. The machine is its path, where it has one.
 //!
 //! The outbox only tells that time goes on: when an item of a new UTC day comes, and at every connection, the days before it that
 //! have no file yet are written from the history (see [`Reader::export_day`]). So a box that was off, or a directory that was
@@ -8,6 +8,7 @@ use super::address::TargetError;
 use super::{Batch, Pending, Sink, SinkError};
 use adapter_core::address::Keys;
 use adapter_core::clock::TimeNs;
+use gateway_base::machine_path::MachinePath;
 use gateway_history::{DAY_NS, HistoryError, Outbox, Reader, day_of};
 use std::path::{Path, PathBuf};
 
@@ -63,7 +64,11 @@ impl ParquetSink {
 
     /// Writes what is missing of the days before `today_ns`.
     async fn finish_days(&mut self, today_ns: TimeNs) -> Result<(), SinkError> {
-        let (target, history, machine) = (self.target.clone(), self.history.clone(), self.outbox.machine().to_owned());
+        let (target, history, machine) = (
+            self.target.clone(),
+            self.history.clone(),
+            self.outbox.path().map_or_else(|| self.outbox.machine().to_owned(), MachinePath::format_topic),
+        );
         let root = self.target.root.clone();
         let work = tokio::task::spawn_blocking(move || write_missing(&target, &history, &machine, today_ns));
         let done = work.await.map_err(|error| SinkError::failed_line(format!("writing a day ended: {error}"), ""))?;
@@ -86,7 +91,7 @@ fn write_missing(target: &ParquetTarget, history: &Path, machine: &str, today_ns
     let Some((first_ns, _)) = reader.read_span()? else { return Ok(()) };
     let mut day_ns = day_of(first_ns).max(today_ns - i64::from(target.days) * DAY_NS);
     while day_ns < today_ns {
-        if !reader.has_day_file(&target.root, machine, day_ns)? {
+        if !reader.has_day_file(&target.root, day_ns)? {
             reader.export_day(&target.root, machine, day_ns)?;
         }
         day_ns += DAY_NS;

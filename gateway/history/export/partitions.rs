@@ -39,13 +39,15 @@ fn escape_name(name: &str) -> String {
     escape_percent(name, b"-_.")
 }
 
-/// The file of a machine, box and day for one kind of rows.
-fn day_file(root: &Path, kind: &str, (machine, box_id): (&str, &str), day_ns: TimeNs) -> PathBuf {
+/// The directory of a machine for one kind of rows.
+fn machine_directory(root: &Path, kind: &str, machine: &str) -> PathBuf {
+    root.join(kind).join(format!("machine={}", escape_name(machine)))
+}
+
+/// The file of a box and day below the directory of a machine.
+fn day_file(machine: PathBuf, box_id: &str, day_ns: TimeNs) -> PathBuf {
     let date: String = gateway_base::moment::format_utc(day_ns).chars().take(10).collect();
-    root.join(kind)
-        .join(format!("machine={}", escape_name(machine)))
-        .join(format!("date={date}"))
-        .join(format!("{}.parquet", escape_name(box_id)))
+    machine.join(format!("date={date}")).join(format!("{}.parquet", escape_name(box_id)))
 }
 
 impl Reader {
@@ -54,12 +56,18 @@ impl Reader {
         Ok(known_box_id(&self.db)?.unwrap_or_else(|| "local".to_owned()))
     }
 
-    /// Are the samples of this day in the lake already?
+    /// Are the samples of this day in the lake already, under whatever machine? One that was named anew or moved to another place keeps the days
+    /// that it had written.
     ///
     /// # Errors
-    /// What `SQLite` says.
-    pub fn has_day_file(&self, root: &Path, machine: &str, day_ns: TimeNs) -> Result<bool, HistoryError> {
-        Ok(day_file(root, "samples", (machine, &self.box_name()?), day_ns).exists())
+    /// What `SQLite` says, or the directory cannot be read.
+    pub fn has_day_file(&self, root: &Path, day_ns: TimeNs) -> Result<bool, HistoryError> {
+        let (samples, box_id) = (root.join("samples"), self.box_name()?);
+        if !samples.exists() {
+            return Ok(false);
+        }
+        let machines = fs::read_dir(&samples).map_err(add_path(&samples))?.filter_map(Result::ok);
+        Ok(machines.into_iter().any(|machine| day_file(machine.path(), &box_id, day_ns).exists()))
     }
 
     /// Writes the files of the UTC day that begins at `day_ns`; an older file of that day is replaced. Without samples there
@@ -70,7 +78,7 @@ impl Reader {
     pub fn export_day(&self, root: &Path, machine: &str, day_ns: TimeNs) -> Result<DayWritten, HistoryError> {
         let mut written = DayWritten::default();
         let box_id = self.box_name()?;
-        let file = |kind: &str| day_file(root, kind, (machine, &box_id), day_ns);
+        let file = |kind: &str| day_file(machine_directory(root, kind, machine), &box_id, day_ns);
         let query = Query::between(day_ns, day_ns + DAY_NS);
         if self.has_samples(&query)? {
             let _view = self.begin_view()?;
@@ -120,8 +128,8 @@ mod tests {
 
     #[test]
     fn names_of_machines_become_names_of_directories() {
-        let file =
-            day_file(Path::new("/lake"), "samples", ("Lathe 7/车", "Lathe-7-3fa9c1b2d4"), 1_769_847_300_100_000_000);
+        let machine = machine_directory(Path::new("/lake"), "samples", "Lathe 7/车");
+        let file = day_file(machine, "Lathe-7-3fa9c1b2d4", 1_769_847_300_100_000_000);
         let text = file.display().to_string();
         assert_eq!(text, "/lake/samples/machine=Lathe%207%2F%E8%BD%A6/date=2026-01-31/Lathe-7-3fa9c1b2d4.parquet");
         assert_eq!(day_of(1_769_847_300_100_000_000) % DAY_NS, 0);

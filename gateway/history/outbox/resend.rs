@@ -84,20 +84,23 @@ impl<'a> ResentItems<'a> {
         contents.extend(self.make_samples(piece)?);
         contents.extend(self.make_means(piece)?);
         contents.sort_by_key(|one| one.at_ns);
-        let (mut step, mut place) = (0, 0);
+        let mut next = 0;
         for item in &mut contents {
-            let of_item = item.at_ns.div_euclid(STEP_NS).unsigned_abs();
-            place = if of_item == step { place + 1 } else { 0 };
-            step = of_item;
-            item.sequence = step * PLACES + place.min(PLACES - 1);
+            // More items of one step than it has places take those of the steps after it.
+            item.sequence = next.max(item.at_ns.div_euclid(STEP_NS).unsigned_abs() * PLACES);
+            next = item.sequence + 1;
         }
         Ok(contents)
     }
 
     fn make_samples(&mut self, piece: &Range<TimeNs>) -> Result<Vec<Item>, HistoryError> {
-        let reader = self.reader;
-        let mut items = Vec::new();
-        reader.for_each_chunk(&Query::between(piece.start, piece.end), |chunk| {
+        let (reader, mut items) = (self.reader, Vec::new());
+        // Also of those that have no value in the piece: the first of it tells why.
+        let mut series: Vec<&Arc<SeriesInfo>> = self.by_number.values().collect();
+        series.sort_unstable_by_key(|info| info.id);
+        let names: Vec<Arc<str>> = series.into_iter().map(|info| info.name.clone()).collect();
+        let query = Query::between(piece.start, piece.end).with_series(names.iter().map(|name| &**name));
+        reader.for_each_chunk(&query, |chunk| {
             (0..chunk.at_ns.len()).for_each(|row| self.make_tick(chunk, row, &mut items));
             ControlFlow::Continue(())
         })?;

@@ -88,7 +88,7 @@ impl SmtpConnection {
         let exchange = async {
             let refused = self.name_recipients(target).await?;
             self.line.command(Data).await.map_err(|error| explain(target, &error))?;
-            self.line.message(mail).await.map_err(|error| judge_refusal(target, sequence, &error))?;
+            self.line.command(frame_mail(mail)).await.map_err(|error| judge_refusal(target, sequence, &error))?;
             Ok(refused)
         };
         let sent = timeout(DEADLINE, exchange).await;
@@ -124,6 +124,15 @@ impl SmtpConnection {
     pub(super) async fn quit(mut self) {
         let _gone = timeout(Duration::from_secs(1), self.line.quit()).await;
     }
+}
+
+/// A mail with the mark of its end (RFC 5321, 4.5.2), as one piece: of two, the second one waits until the server has confirmed the first,
+/// which it does after 40 ms.
+fn frame_mail(mail: &[u8]) -> String {
+    let text = String::from_utf8_lossy(mail);
+    let text = text.strip_suffix("\r\n").unwrap_or(&text);
+    let dot = if text.starts_with('.') { "." } else { "" };
+    format!("{dot}{}\r\n.\r\n", text.replace("\r\n.", "\r\n.."))
 }
 
 /// What to tell of recipients that the server does not take.
@@ -184,4 +193,25 @@ fn broken(target: &MailTarget, what: &str) -> SinkError {
 
 fn place(target: &MailTarget) -> String {
     format!("mail server {}", format_place(&target.at))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::frame_mail;
+    use proptest::prelude::*;
+
+    /// What a server makes of it: lines up to the single dot, without the dot that was added (RFC 5321, 4.5.2).
+    fn read_framed(framed: &str) -> Option<String> {
+        let (text, rest) = framed.split_once("\r\n.\r\n")?;
+        assert_eq!(rest, "", "nothing comes after the end");
+        Some(text.split("\r\n").map(|line| line.strip_prefix('.').unwrap_or(line)).collect::<Vec<_>>().join("\r\n"))
+    }
+
+    proptest! {
+        #[test]
+        fn a_server_reads_the_mail_as_it_was_written(lines in proptest::collection::vec("[.a]{0,4}|[ -~]{0,20}", 1..8)) {
+            let mail = lines.join("\r\n");
+            prop_assert_eq!(read_framed(&frame_mail(format!("{mail}\r\n").as_bytes())), Some(mail));
+        }
+    }
 }

@@ -232,8 +232,7 @@ impl MqttSink {
             .iter()
             .filter(|reading| !layout::is_unprovided(reading) && !self.described.contains(&reading.series.id))
             .collect();
-        let messages: Vec<_> =
-            fresh.iter().map(|reading| discovery::build_sensor_document(&self.outbox, &prefix, reading)).collect();
+        let messages = discovery::build_sensor_documents(&self.outbox, &prefix, &fresh);
         if messages.is_empty() {
             return Ok(());
         }

@@ -160,18 +160,22 @@ fn with_a_path_every_output_carries_it() {
     let (Some(plant), Some(broker)) = (Plant::start(), Broker::start()) else { return };
     let sinks = [
         "mqtt://127.0.0.1:{port}",
-        "mqtt://127.0.0.1:{port}/uns?layout=uns",
+        "mqtt://127.0.0.1:{port}/uns?layout=uns&discovery=homeassistant",
         "mqtt://127.0.0.1:{port}/flat?layout=flat",
         "sparkplug://127.0.0.1:{port}",
     ];
     let told = run_box(&plant, &broker, &format!("path = \"{PATH}\"\n"), &sinks);
     let (id, path) = (&told.box_id, format!("{PATH}/Lathe-7"));
     let dotted = path.replace('/', ".");
+    let sensors = format!("homeassistant/sensor/{}", path.replace('/', "_"));
     let group = PATH.replace('/', ".");
     for topic in told.topics.keys() {
-        let places = [format!("{path}/"), format!("uns/{path}/"), "flat/".to_owned(), format!("spBv1.0/{group}/")];
-        assert!(places.iter().any(|place| topic.starts_with(place)), "{topic}");
+        let own = [format!("{path}/"), format!("uns/{path}/"), format!("spBv1.0/{group}/"), format!("{sensors}/")];
+        assert!(topic.starts_with("flat/") || own.iter().any(|place| topic.starts_with(place)), "{topic}");
     }
+    let sensor: Json = serde_json::from_str(&told.topics[&format!("{sensors}/spindle_power_w/config")]).expect("JSON");
+    assert_eq!(sensor["state_topic"], format!("uns/{path}/spindle_power_w"));
+    assert_eq!(sensor["device"]["identifiers"], serde_json::json!([path.replace('/', "_")]));
     let power: f64 = told.topics[&format!("uns/{path}/spindle_power_w")].parse().expect("a value alone");
     assert!(power.is_finite());
     for topic in [

@@ -3,6 +3,7 @@
 //! `nats-server` and `initdb` are looked for; where one is not installed the tests say that they skip, with `CNC_GATEWAY_CI` set
 //! they fail.
 
+mod backfill;
 mod boxes;
 mod identity;
 mod intake;
@@ -20,6 +21,7 @@ mod resent;
 mod restored;
 mod secured;
 mod shifts;
+mod silent_box;
 mod sizes;
 mod stream_size;
 mod told;

@@ -2,6 +2,7 @@
 
 use adapters::{ChannelId, Sample, Slot, Value};
 use gateway::history::{DAY_NS, Diagnosis, ExtraSeries, ExtraValue, Options, Outbox, OutboxSettings, Writer};
+use gateway::machine_path::NamedMachine;
 use gateway::sinks::{Board, SinkAddress, drive};
 use serde_json::{Value as Json, json};
 use std::path::Path;
@@ -29,8 +30,17 @@ pub(crate) fn duckdb(directory: &Path, statement: &str) -> Option<Vec<Vec<Json>>
     Some(serde_json::from_slice(&said.stdout).expect("rows"))
 }
 
+/// The folders of machines that hold the finished day of a box.
+fn folders_of(lake: &Path, box_id: &str) -> Vec<String> {
+    let machines = std::fs::read_dir(lake.join("samples")).into_iter().flatten().filter_map(Result::ok);
+    let holds = |machine: &std::fs::DirEntry| {
+        machine.path().join("date=2023-12-08").join(format!("{box_id}.parquet")).is_file()
+    };
+    machines.filter(holds).map(|machine| machine.file_name().to_string_lossy().into_owned()).collect()
+}
+
 /// A minute of a machine around midnight, with a diagnosis that names this effect, through the sink `parquet:`.
-fn run_over_midnight(lake: &Path, machine: &str, effect: &str, own: &Path) {
+fn run_over_midnight(lake: &Path, machine: impl Into<NamedMachine>, effect: &str, own: &Path) {
     let path = own.join("history.db");
     let outbox = Outbox::new(machine, OutboxSettings::default(), ["lake".to_owned()]);
     let extras = vec![ExtraSeries::new_text("machine_state", "state", "状态")];
@@ -57,11 +67,7 @@ fn run_over_midnight(lake: &Path, machine: &str, effect: &str, own: &Path) {
     }
     writer.flush().expect("durable");
     let until = Instant::now() + Duration::from_secs(30);
-    let wanted = lake.join("samples");
-    while !std::fs::read_dir(&wanted).is_ok_and(|mut machines| {
-        machines.any(|found| found.is_ok_and(|found| found.path().display().to_string().contains(&machine[..4])))
-    }) || board.list_sinks()[0].behind_items > 0
-    {
+    while folders_of(lake, &outbox.box_id()).is_empty() || board.list_sinks()[0].behind_items > 0 {
         assert!(Instant::now() < until, "no partition: {:?}", board.list_sinks());
         std::thread::sleep(Duration::from_millis(20));
     }
@@ -115,6 +121,23 @@ fn a_day_is_written_by_itself_and_duckdb_reads_equal_values_units_and_findings()
         json!([found[0][0], found[0][1], found[0][2], found[0][3]]),
         json!(["bearing_friction", 2, 2, "Lathe 7, Mill 2"])
     );
+}
+
+#[test]
+fn a_machine_with_a_path_has_a_folder_of_it_and_a_day_is_written_once_whatever_the_machine_is_called_later() {
+    let (lake, fresh) = (tempfile::tempdir().expect("a directory"), tempfile::tempdir().expect("a directory"));
+    let own = tempfile::tempdir().expect("a directory");
+    let placed =
+        || NamedMachine { name: "Lathe 7".to_owned(), path: Some("shanghai/line-2/lathe-7".parse().expect("a path")) };
+    run_over_midnight(lake.path(), "Lathe 7", "bearing_friction", own.path());
+    run_over_midnight(lake.path(), placed(), "bearing_friction", own.path());
+    let box_id = gateway::history::box_id(&own.path().join("history.db"), "Lathe 7").expect("named");
+    assert_eq!(folders_of(lake.path(), &box_id), ["machine=Lathe%207"], "the day is there already");
+    run_over_midnight(fresh.path(), placed(), "bearing_friction", own.path());
+    assert_eq!(folders_of(fresh.path(), &box_id), ["machine=shanghai%2Fline-2%2Flathe-7"]);
+    let select = "SELECT DISTINCT machine FROM read_parquet('samples/*/*/*.parquet', hive_partitioning = true)";
+    let Some(rows) = duckdb(fresh.path(), select) else { return };
+    assert_eq!(json!(rows), json!([["shanghai/line-2/lathe-7"]]));
 }
 
 /// The same mean from two engines that are not ours, and from what was recorded: 300 ticks from 970 to 999.9 W on the first day, from 1000 on the

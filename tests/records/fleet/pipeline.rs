@@ -3,8 +3,10 @@
 use crate::fleet::postgres::Postgres;
 use adapters::{Absence, ChannelId, Sample, Slot, Value};
 use gateway::clock::ClockMark;
+use gateway::fleet::parse_cluster;
 use gateway::history::{ExtraSeries, ExtraValue, Options, Outbox, OutboxSettings, Writer};
 use gateway::machine_path::NamedMachine;
+use gateway::nats::Connection;
 use gateway::sinks::{Board, Sinks, drive};
 use std::time::Duration;
 use testkit::nats_cluster::Cluster;
@@ -26,22 +28,42 @@ impl Plant {
 
     /// With these lines in the configuration of the NATS server.
     pub(crate) fn with(lines: &str) -> Option<Self> {
-        let plant = Self::start_servers(lines)?;
-        let made = run(&["fleet", "stream", &plant.address, "--max-gb", "4"]);
+        Some(Self::start_servers(lines, &[])?.with_stream())
+    }
+
+    /// With these settings of PostgreSQL.
+    pub(crate) fn with_database(settings: &[&str]) -> Option<Self> {
+        Some(Self::start_servers("", settings)?.with_stream())
+    }
+
+    fn with_stream(self) -> Self {
+        let made = run(&["fleet", "stream", &self.address, "--max-gb", "4"]);
         assert!(made.status.success(), "{}", stderr(&made));
-        Some(plant)
+        self
     }
 
     /// Without a stream yet.
     pub(crate) fn without_stream() -> Option<Self> {
-        Self::start_servers("")
+        Self::start_servers("", &[])
     }
 
-    fn start_servers(lines: &str) -> Option<Self> {
+    fn start_servers(lines: &str, settings: &[&str]) -> Option<Self> {
         let cluster = Cluster::with(1, &format!("{{store}}\n{lines}"))?;
-        let postgres = Postgres::start()?;
+        let postgres = Postgres::with(&[], |_| {}, settings)?;
         let address = format!("{}/cnc", cluster.address());
         Some(Self { _cluster: cluster, postgres, address })
+    }
+
+    /// Has a running reader written and acknowledged everything that is in the stream?
+    pub(crate) fn has_read_everything(&self) -> bool {
+        let (target, _) = parse_cluster(&self.address).expect("an address");
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("threads");
+        runtime.block_on(async {
+            let mut connection = Connection::open(&target, 0, "test").await.expect("connected");
+            // Before the reader has begun there is nobody to ask about.
+            let backlog = connection.read_backlog("CNC", "fleet").await;
+            backlog.is_ok_and(|backlog| backlog.pending == 0 && backlog.under_way == 0)
+        })
     }
 
     /// Everything that waits goes into the database; gives what was said.

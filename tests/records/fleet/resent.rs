@@ -58,11 +58,12 @@ fn told(plant: &Plant) -> String {
     .join("\n--\n")
 }
 
-fn resend(directory: &Path, address: &str, more: &[&str]) -> String {
+/// Sends a history in this directory, of a box that ticks so often a second, and gives what was said.
+pub(crate) fn resend((directory, tick_hz): (&Path, f64), address: &str, more: &[&str]) -> String {
     let config = directory.join("box.toml");
     let (data, history) = (directory.display(), directory.join("history.db"));
     let text = format!(
-        "[gateway]\nname = \"Lathe 7\"\ndata_dir = \"{data}\"\ntick_hz = 1\n[history]\npath = \"{}\"\n\
+        "[gateway]\nname = \"Lathe 7\"\ndata_dir = \"{data}\"\ntick_hz = {tick_hz}\n[history]\npath = \"{}\"\n\
          [[source]]\nname = \"lathe\"\naddress = \"simulated://lathe\"\n[[sink]]\nname = \"fleet\"\naddress = \"{address}\"\n",
         history.display()
     );
@@ -86,18 +87,18 @@ fn what_is_sent_once_more_fills_an_empty_database_and_nothing_comes_twice() {
     first.ingest();
     let original = told(&first);
     // Into the database that has everything.
-    println!("{}", resend(directory.path(), &first.address, &[]).trim());
+    println!("{}", resend((directory.path(), 1.0), &first.address, &[]).trim());
     println!("known already: {}", first.ingest().trim());
     assert_eq!(told(&first), original, "nothing comes twice");
     // Into one that has nothing: first a part, then everything, then everything again.
     let part = ["--from", "2026-01-30T10:20:00Z", "--to", "2026-01-30T10:40:00Z"];
-    resend(directory.path(), &second.address, &part);
+    resend((directory.path(), 1.0), &second.address, &part);
     second.ingest();
     let samples = "SELECT count(*) FROM items WHERE kind = 'sample'";
     assert_eq!(second.postgres.number(samples), 1200);
     for turn in 0..2 {
         let began = Instant::now();
-        println!("{turn}: {}", resend(directory.path(), &second.address, &[]).trim());
+        println!("{turn}: {}", resend((directory.path(), 1.0), &second.address, &[]).trim());
         println!("{} in {:.1} s", second.ingest().trim(), began.elapsed().as_secs_f64());
         assert_eq!(told(&second), original, "{turn}");
         assert_eq!(second.postgres.number(samples), hours.unsigned_abs() * 3600);
