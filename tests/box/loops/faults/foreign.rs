@@ -3,7 +3,7 @@
 
 use super::foreign_mill::{ForeignMill, ROW_S};
 use super::kinds::{FAULTS, Fault};
-use super::{AFTER_S, AtWork, Counted, Course, Now, PATIENCE_S, Told, as_delivered};
+use super::{AFTER_S, AtWork, Counted, Course, MILL_PARTS, Now, PATIENCE_S, Told, as_delivered};
 use adapters::clock::SECOND_NS;
 use adapters::merge::{Delay, Lockstep};
 use adapters::recording::read_path;
@@ -18,9 +18,6 @@ use std::fmt::Write;
 use std::time::Duration;
 
 pub(super) const NAME: &str = "mill of another maker, by recording";
-
-/// Parts before the first fault: both programs have shown what is usual.
-const PARTS: u32 = 30;
 
 /// From when to when a fault stands in the recording.
 struct Window {
@@ -40,7 +37,7 @@ impl Store for Nothing {
 /// The recording as a table of text, what stands in it, and the time of its first row.
 fn record(seed: u64) -> (String, Vec<Window>, f64) {
     let mut machine = ForeignMill::new(seed);
-    let (mut course, mut sample, mut line_fault) = (Course::new(&FAULTS, PARTS, seed), Sample::new_empty(0), None);
+    let (mut course, mut sample, mut line_fault) = (Course::new(&FAULTS, MILL_PARTS, seed), Sample::new_empty(0), None);
     let (mut table, mut windows, mut first_s) = (String::new(), Vec::<Window>::new(), None);
     while course.current().is_some() && machine.now_s < 12.0 * 3600.0 {
         machine.advance();

@@ -59,13 +59,18 @@ impl Counted {
         look: &mut Look<'_>,
     ) {
         let mut dice = Pcg64Mcg::seed_from_u64(seed);
-        let mut watch = SensorWatch::new(SensorModel::from_law(law, &SENSORS), SENSORS.len());
+        // Those that the law looks at, as the box watches them.
+        let watched: Vec<usize> =
+            (0..SENSORS.len()).filter(|at| law.terms.iter().any(|it| it.sensor == SENSORS[*at])).collect();
+        let names: Vec<&str> = watched.iter().map(|at| SENSORS[*at]).collect();
+        let mut watch = SensorWatch::new(SensorModel::from_law(law, &names), names.len());
         let from_s = dice.random_range(3600..7200) / STEP_S * STEP_S;
-        let sensor = dice.random_range(0..2_usize);
+        let sensor = dice.random_range(0..watched.len());
         let (mut told_s, mut stands_at) = (None, None);
         for at_s in (STEP_S..DAY_S).step_by(STEP_S as usize) {
-            let (mut temperatures_c, _) = look(at_s, &mut dice);
-            let mut read = temperatures_c.map(Ok);
+            let (all_c, _) = look(at_s, &mut dice);
+            let mut temperatures_c: Vec<f64> = watched.iter().map(|at| all_c[*at]).collect();
+            let mut read: Vec<Result<f64, Absence>> = temperatures_c.iter().copied().map(Ok).collect();
             if at_s >= from_s {
                 let stood = *stands_at.get_or_insert(temperatures_c[sensor]);
                 temperatures_c[sensor] =
@@ -78,7 +83,7 @@ impl Counted {
             let doubted = watch.list_doubted().iter().find(|it| due(it.since_ns));
             if at_s < from_s {
                 self.healthy_s += STEP_S as f64;
-                self.false_alarms.extend(doubted.map(|it| format!("{at_s} s: {}", SENSORS[it.sensor])));
+                self.false_alarms.extend(doubted.map(|it| format!("{at_s} s: {}", names[it.sensor])));
             } else if doubted.is_some_and(|it| it.sensor == sensor) {
                 told_s = Some((at_s - from_s) as f64);
                 break;
