@@ -43,6 +43,8 @@ pub(super) static FILES: &[WebFile] = files! {
     SCRIPT "words-system.js" from "words/system.js",
     SCRIPT "box-texts.js" from "box-texts.js",
     SCRIPT "box-sentences.js" from "box-sentences.js",
+    SCRIPT "device-sentences.js" from "device-sentences.js",
+    SCRIPT "script-sentences.js" from "script-sentences.js",
     SCRIPT "gaps.js" from "gaps.js",
     SCRIPT "plot.js" from "plot.js",
     SCRIPT "ribbon.js" from "ribbon.js",

@@ -23,9 +23,9 @@ pub(super) fn describe_news(news: &WearNews) -> Notice {
             (
                 "wear_other_material",
                 format!(
-                    "all tools take {:+.1} % more than before, which is taken for another lot of material; the wear that is believed goes \
+                    "all tools take {} than before, which is taken for another lot of material; the wear that is believed goes \
                      from {}. If the material is the same, the edges have changed instead",
-                    100.0 * change,
+                    describe_change(*change),
                     edges.join(", ")
                 ),
             )
@@ -34,11 +34,39 @@ pub(super) fn describe_news(news: &WearNews) -> Notice {
             "wear_limit_by_material",
             format!(
                 "edge {edge} takes more than the limit of the wear model, but is believed to have {wear_mm:.2} mm of wear, far less than its \
-                 criterion: harder material ({:+.1} % by all tools), or a cut that takes more than the model says. Look at the edge if \
-                 neither is so",
-                100.0 * material
+                 criterion: harder material (all tools take {} than usual), or a cut that takes more than the model says. Look at the \
+                 edge if neither is so",
+                describe_change(*material)
             ),
         ),
     };
     Notice::new(Severity::Info, kind, text)
+}
+
+/// A change as a share, in words that say which way it goes.
+fn describe_change(share: f64) -> String {
+    let way = if share < 0.0 { "less" } else { "more" };
+    format!("{:.1} % {way}", 100.0 * share.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// No change is written with a sign beside a word that says the same, or the contrary.
+    #[test]
+    fn every_change_is_told_the_way_it_goes() {
+        for share in (-500..=500).map(|it| f64::from(it) / 1000.0) {
+            let edges = vec![("T1".to_owned(), 0.1, 0.2)];
+            for news in [
+                WearNews::OtherMaterial { change: share, edges },
+                WearNews::LimitByMaterial { edge: "T1".to_owned(), wear_mm: 0.1, material: share },
+            ] {
+                let text = describe_news(&news).operator;
+                let way = if share < 0.0 { "less" } else { "more" };
+                let told = format!("all tools take {:.1} % {way} than", 100.0 * share.abs());
+                assert!(text.contains(&told) && !text.contains("+") && !text.contains(" -"), "{share}: {text}");
+            }
+        }
+    }
 }

@@ -1,5 +1,8 @@
 // What the box answers a person in English, as whole sentences, and the same in Chinese. `{0}` and so on stand for what is filled in.
 // A test finds here every sentence that an answer or a note of the audit can be.
+import { DEVICE_SENTENCES } from "./device-sentences.js";
+import { SCRIPT_SENTENCES } from "./script-sentences.js";
+
 export const SENTENCES = [
   // Signing in, roles, persons.
   ["name or token is wrong", "姓名或令牌错误"],
@@ -315,24 +318,33 @@ export const SENTENCES = [
 ];
 
 const escaped = (text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");
-const patterns = SENTENCES.map(([en, zh]) => [
-  new RegExp(
-    `^${en
-      .split(/\{\d\}/)
-      .map(escaped)
-      .join("(.+?)")}$`,
-    "s",
-  ),
-  [...en.matchAll(/\{(\d)\}/g)].map((it) => Number(it[1])),
-  zh,
-]);
 
-/** The Chinese of a whole sentence; nothing where it is none of these. What is filled in stays as it is, unless it is one itself. */
-export function sentence(text) {
-  for (const [pattern, places, zh] of patterns) {
-    const found = pattern.exec(text);
-    const filled = (at) => found[places.indexOf(Number(at)) + 1] ?? "";
-    if (found) return zh.replace(/\{(\d)\}/g, (_, at) => sentence(filled(at)) ?? filled(at));
-  }
-  return null;
+/** From a table to what finds the Chinese of a whole sentence; it gives nothing where the sentence is none of the table. What is filled in
+    stays as it is, unless it is one itself. */
+function translator(table) {
+  const patterns = table.map(([en, zh]) => [
+    new RegExp(
+      `^${en
+        .split(/\{\d\}/)
+        .map(escaped)
+        .join("(.*?)")}\\.?$`,
+      "s",
+    ),
+    [...en.matchAll(/\{(\d)\}/g)].map((it) => Number(it[1])),
+    zh,
+  ]);
+  return function translate(text) {
+    for (const [pattern, places, zh] of patterns) {
+      const found = pattern.exec(text);
+      const filled = (at) => found[places.indexOf(Number(at)) + 1] ?? "";
+      if (found) return zh.replace(/\{(\d)\}/g, (_, at) => translate(filled(at)) ?? filled(at));
+    }
+    return null;
+  };
 }
+
+export const sentence = translator([...SENTENCES, ...DEVICE_SENTENCES]);
+
+/** Of sentences that begin alike the one that says most is meant. */
+const said = ([en]) => en.replace(/\{\d\}/g, "").length;
+export const scriptSentence = translator([...SCRIPT_SENTENCES].sort((a, b) => said(b) - said(a)));

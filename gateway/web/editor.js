@@ -1,7 +1,7 @@
 // The editor of the rules: CodeMirror with the words of the box. It lives in a shadow root, where its styles are sheets
 // of the object model: the policy of the page lets no other styles in.
 import * as cm from "/web/codemirror.js";
-import { own, t } from "./words.js";
+import { own, scriptWords, t } from "./words.js";
 
 const KEYWORDS = new Set([
   "let",
@@ -204,7 +204,7 @@ export class Editor {
           from,
           to: Math.max(from, line.to),
           severity: "error",
-          message: [p.what, p.next].filter(Boolean).join("\n"),
+          message: [p.what, p.next].filter(Boolean).map(scriptWords).join("\n"),
         };
       });
     this.view.dispatch(cm.setDiagnostics(this.view.state, marks));

@@ -1,7 +1,7 @@
 // The words of the page in the language of the reader. Names of channels, states and reasons come from the box itself.
 import { WORDS } from "./word-table.js";
 import { PHRASES } from "./box-texts.js";
-import { sentence } from "./box-sentences.js";
+import { scriptSentence, sentence } from "./box-sentences.js";
 
 const asked = new URLSearchParams(location.search).get("lang");
 const stored = () => {
@@ -68,6 +68,20 @@ export function box(text) {
   if (known) return localTimes(known);
   const ranges = localTimes(text).replace(/(\d) to (-?\d)/g, "$1 至 $2");
   return PHRASES.reduce((done, [en, zh]) => done.split(en).join(zh), ranges);
+}
+
+/** A problem of a script as the box writes it: its place, what is wrong, and below it what to do. */
+const SCRIPT_PROBLEM = /^((?:\S+?(?::\d+){0,2}: )?)(.+?)(?:\n {4}(.+))?$/s;
+
+/** What is said of a script, in Chinese where that is read; the names in it stay as they are written in the script. */
+export function scriptWords(text) {
+  if (chosen !== "zh" || !text) return text ?? "";
+  const whole = scriptSentence(text);
+  if (whole) return whole;
+  const [, place, what, next] = SCRIPT_PROBLEM.exec(text) ?? [];
+  if (!what) return text;
+  const words = scriptSentence(what) ?? what;
+  return `${place}${words}${next ? `\n    ${scriptSentence(next) ?? next}` : ""}`;
 }
 
 export function setLanguage(next) {

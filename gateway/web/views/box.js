@@ -1,7 +1,7 @@
 // Box: the sources, the store and the scripts, receivers, doctor, recipe, backup, persons, the configuration in force.
 import { card, fill, make, row } from "/web/parts.js";
 import { bytes, duration, number, quantity, sourceName } from "/web/format.js";
-import { box, t } from "/web/words.js";
+import { box, scriptWords, t } from "/web/words.js";
 import { personsCard } from "/web/system-persons.js";
 import { systemView } from "/web/system.js";
 
@@ -84,7 +84,7 @@ function systemCards(context) {
     fill(
       scripts,
       status.scripts.map((s) =>
-        row(s.file, t(`script_${s.condition}`), s.error ? box(s.error) : t("version_of", s.version), {
+        row(s.file, t(`script_${s.condition}`), s.error ? scriptWords(s.error) : t("version_of", s.version), {
           dot: tone[s.condition] ?? "warn",
           tone: tone[s.condition] === "bad" ? "bad" : "",
         }),

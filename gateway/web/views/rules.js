@@ -2,7 +2,7 @@
 // it is one click away. Nothing that is typed here counts before "Activate".
 import { ask, card, fill, make, say, send, table } from "/web/parts.js";
 import { dateTime, duration, number } from "/web/format.js";
-import { box, own, t } from "/web/words.js";
+import { own, scriptWords, t } from "/web/words.js";
 import { Editor, vocabulary } from "/web/editor.js";
 import { createRule } from "/web/rules-new.js";
 import { showBacktest, showTrials } from "/web/rules-results.js";
@@ -323,7 +323,7 @@ class RulesView {
     const mine = status.scripts.find((s) => s.file === this.current);
     if (mine?.error && mine.error !== this.told) {
       this.told = mine.error;
-      say(this.note, box(mine.error));
+      say(this.note, scriptWords(mine.error));
     }
   }
 

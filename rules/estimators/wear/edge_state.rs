@@ -1,5 +1,6 @@
 //! What the filter keeps of edges and operations, and what it tells.
 
+use super::operation_limit::FreshLevels;
 use super::prior::RATES_MAX;
 use super::work::{WorkKey, WorkReference};
 use serde::{Deserialize, Serialize};
@@ -95,6 +96,9 @@ pub(super) struct OperationGroup {
     pub(super) at: usize,
     pub(super) path_mm: f64,
     pub(super) used: u64,
+    /// What new edges have shown of it.
+    #[serde(default)]
+    pub(super) fresh: FreshLevels,
 }
 
 /// A measurement, with the states that it depends on.

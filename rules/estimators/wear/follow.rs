@@ -20,6 +20,7 @@
 
 use super::edge_state::{CuttingEdge, EdgeMeasurement, OperationGroup, WearNews};
 use super::gaussian::Gaussian;
+use super::operation_limit::FreshLevels;
 use super::outlook::{Known, Outlook};
 use super::prior::*;
 use super::work::{EdgeWork, WorkKey, WorkReference};
@@ -34,7 +35,7 @@ pub struct WearFollower {
     pub(super) hardness: usize,
     level: usize,
     pub(super) edges: Vec<CuttingEdge>,
-    groups: Vec<OperationGroup>,
+    pub(super) groups: Vec<OperationGroup>,
     program: String,
     work_material: String,
     last_s: f64,
@@ -211,6 +212,7 @@ impl WearFollower {
             return None;
         }
         self.groups[group].used = self.parts;
+        self.note_fresh_level(group, edge, excess, work);
         let one = EdgeMeasurement {
             group: self.groups[group].at,
             edge,
@@ -250,13 +252,13 @@ impl WearFollower {
         let (key, path_mm, used) = (work.key.clone(), work.path_mm, self.parts);
         if self.groups.len() < GROUPS_MAX {
             let at = self.joint.add(mean, sd * sd);
-            self.groups.push(OperationGroup { key, at, path_mm, used });
+            self.groups.push(OperationGroup { key, at, path_mm, used, fresh: FreshLevels::default() });
             return (self.groups.len() - 1, true);
         }
         let oldest = (0..self.groups.len()).min_by_key(|at| self.groups[*at].used).unwrap_or(0);
         let at = self.groups[oldest].at;
         self.joint.reset_state(at, mean, sd * sd);
-        self.groups[oldest] = OperationGroup { key, at, path_mm, used };
+        self.groups[oldest] = OperationGroup { key, at, path_mm, used, fresh: FreshLevels::default() };
         (oldest, true)
     }
 

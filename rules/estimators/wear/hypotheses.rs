@@ -89,11 +89,16 @@ impl WearFollower {
         sum
     }
 
-    /// The rule of the source: the power has passed the limit. It counts where every operation that has one says so.
+    /// The rule of the source: the power has passed the limit. It counts where every operation that has one says so. The limit is that of the
+    /// model, moved by what new edges have shown of the operation.
     pub(super) fn hold_against_limit(&mut self, at: usize, works: &[&EdgeWork], news: &mut Vec<WearNews>) {
         let edge = &self.edges[at];
         let of_edge = works.iter().filter(|work| work.edge == edge.name && is_leading_operation(work, works));
-        let shares: Vec<f64> = of_edge.filter_map(|work| work.of_limit()).collect();
+        let of_limit = |work: &&EdgeWork| {
+            let beside = self.learned_level(&work.key).map_or(0.0, |level| level.value);
+            Some(work.of_limit()? / beside.exp())
+        };
+        let shares: Vec<f64> = of_edge.filter_map(of_limit).collect();
         let (limit_before, material_before) = (edge.limit_parts, edge.material_parts);
         let is_above = !shares.is_empty() && shares.iter().all(|share| *share > 1.0);
         // The filter may have lost some wear to a softer lot. What it holds for much less than the criterion is an edge in harder

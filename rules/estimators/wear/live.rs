@@ -65,6 +65,9 @@ struct SavedWear {
     follower: WearFollower,
     works: Vec<EdgeWork>,
     part_count: Option<f64>,
+    /// The models to which what was learned of operations belongs.
+    #[serde(default)]
+    models: u64,
 }
 
 /// The model in use, and what spoke for it.
@@ -133,6 +136,7 @@ impl WearEstimator {
     /// The models in force, the newest last, and the name of the machine for which they are looked up.
     pub fn set_models(&mut self, machine: &str, models: Vec<Arc<WearRecord>>) {
         machine.clone_into(&mut self.machine);
+        self.memory.follower.keep_levels_of(&models, &mut self.memory.models);
         self.models = models;
         self.choose_model();
     }
@@ -353,8 +357,11 @@ impl WearEstimator {
         if !soon || self.limit.is_none() {
             self.limit_ns = Some(at_ns);
             let found = moment.to_conditions().ok_or_else(|| NoEstimate::CutUnknown.to_string());
+            let texts = self.texts.each_ref().map(|text| text.as_deref().unwrap_or_default());
+            let beside = self.memory.follower.find_level_of_cut(&self.memory.works, texts);
             self.limit = Some(found.and_then(|cut: CutConditions| {
-                compute_power_limit(&record.model, &cut, record.criterion_mm).map_err(|refusal| refusal.to_string())
+                let limit = compute_power_limit(&record.model, &cut, record.criterion_mm);
+                limit.map(|limit| limit.move_by(beside)).map_err(|refusal| refusal.to_string())
             }));
         }
         self.usable_limit().map(|limit| Estimate { value: limit.power_w, sd: limit.sd_w })

@@ -21,6 +21,7 @@
 //! | `work` | what an edge did in one part, against what a sharp one takes |
 //! | `gaussian`, `edge_state`, `follow` | the wear of every edge, followed by a Kalman filter |
 //! | `hypotheses` | what may have happened between two parts: another material, a new edge; the limit beside the filter |
+//! | `operation_limit` | the limit of an operation as new edges have shown it |
 //! | `prior` | what the filter believes beforehand |
 //! | `outlook` | probability of passing the criterion, parts left |
 //! | `live` | all of it beside the running machine |
@@ -40,6 +41,7 @@ mod identify;
 mod live;
 mod model;
 mod model_selection;
+mod operation_limit;
 mod orthogonal_array;
 mod outlook;
 mod physical;

@@ -3,6 +3,7 @@
 use super::conditions::{ConditionFactor, CutConditions, WEAR};
 use super::model::WearModel;
 use super::power_prediction::Predicted;
+use crate::estimate::Estimate;
 use crate::regression::{Refusal, RefusalKind};
 use serde::Serialize;
 
@@ -58,6 +59,26 @@ pub struct PowerLimit {
     pub observability: Observability,
     /// Factors in which this cut lies outside what the model was fitted on.
     pub extrapolated: Vec<&'static str>,
+}
+
+impl PowerLimit {
+    /// The limit of an operation that takes so much more than the model says, as a logarithm; as it is where that was not learned.
+    #[must_use]
+    pub(super) fn move_by(self, level: Option<Estimate>) -> Self {
+        let Some(level) = level else { return self };
+        let factor = level.value.exp();
+        let own = |watts: f64| watts * factor;
+        let (power_w, sd_w) = (own(self.power_w), own(self.sd_w).hypot(own(self.power_w) * level.sd));
+        let half = 0.5 * (self.interval_w.1 - self.interval_w.0) * sd_w / self.sd_w.max(f64::MIN_POSITIVE);
+        Self {
+            power_w,
+            sd_w,
+            interval_w: (power_w - half, power_w + half),
+            slope_w_per_mm: own(self.slope_w_per_mm),
+            wear_half_interval_mm: self.wear_half_interval_mm.map(|_| half / own(self.slope_w_per_mm)),
+            ..self
+        }
+    }
 }
 
 /// The wear that a power means.

@@ -40,10 +40,13 @@ pub(super) fn look(machine: &Simulated, at_s: i64, dice: &mut Pcg64Mcg) -> ([f64
     (sensors.map(&mut noisy), moment.truth.thermal_error_um)
 }
 
+/// The temperatures and the true error of a machine at a time, s.
+pub(super) type Look<'a> = dyn FnMut(i64, &mut Pcg64Mcg) -> ([f64; 3], f64) + 'a;
+
 /// A row per minute of this many hours, with a gauge that is wrong by half a micrometre.
-fn recorded(seed: u64, hours: i64) -> Recording {
-    let (machine, mut dice) = (machine(seed), Pcg64Mcg::seed_from_u64(seed));
-    let rows: Vec<([f64; 3], f64)> = (0..hours * 60).map(|minute| look(&machine, minute * 60, &mut dice)).collect();
+fn recorded(look: &mut Look<'_>, seed: u64, hours: i64) -> Recording {
+    let mut dice = Pcg64Mcg::seed_from_u64(seed);
+    let rows: Vec<([f64; 3], f64)> = (0..hours * 60).map(|minute| look(minute * 60, &mut dice)).collect();
     let mut recording = Recording::new("a day", (0..rows.len()).map(|row| row as f64 * 60.0).collect(), None);
     for (at, name) in SENSORS.into_iter().enumerate() {
         recording.set_column(name, Cells::Numbers(Numbers::from_values(rows.iter().map(|row| row.0[at]).collect())));
@@ -53,11 +56,17 @@ fn recorded(seed: u64, hours: i64) -> Recording {
     recording
 }
 
-/// The law that such a day gives.
-pub(super) fn identify_law(seed: u64, hours: i64) -> ThermalLaw {
-    let collected = collect_rows(&recorded(seed, hours)).expect("usable");
+/// The law that such a day of any machine gives.
+pub(super) fn identify_law_of(look: &mut Look<'_>, seed: u64, hours: i64) -> ThermalLaw {
+    let collected = collect_rows(&recorded(look, seed, hours)).expect("usable");
     let learned = learn_law(&collected.course, SelectionSettings::default(), None).expect("a law");
     learned.best_candidate().fit.law.clone()
+}
+
+/// The law of a day of the simulated machine.
+fn identify_law(seed: u64, hours: i64) -> ThermalLaw {
+    let machine = machine(seed);
+    identify_law_of(&mut |at_s, dice| look(&machine, at_s, dice), seed, hours)
 }
 
 /// Root of the mean square and greatest magnitude.
@@ -268,13 +277,7 @@ impl ColdDay {
 /// `cargo test --test box days_that_begin -- --nocapture`
 #[test]
 fn days_that_begin_outside_the_range_are_compensated_and_told() {
-    let collected = collect_rows(&recorded(11, 8)).expect("usable");
-    let law = learn_law(&collected.course, SelectionSettings::default(), None)
-        .expect("a law")
-        .best_candidate()
-        .fit
-        .law
-        .clone();
+    let law = identify_law(11, 8);
     for whole_hall in [true, false] {
         for outside_k in [1.0, 3.0, 8.0] {
             let day = ColdDay { outside_k, hours: 8, whole_hall };

@@ -24,6 +24,7 @@ mod page;
 mod reading;
 mod readme;
 mod replay;
+mod said;
 mod service;
 mod settings;
 mod story;

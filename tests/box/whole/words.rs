@@ -9,7 +9,7 @@ fn web() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("gateway/web")
 }
 
-fn read(name: &str) -> String {
+pub(super) fn read(name: &str) -> String {
     std::fs::read_to_string(web().join(name)).expect("a file of the page")
 }
 
@@ -65,7 +65,7 @@ fn rows_of(text: &str) -> Vec<(String, String, String)> {
     rows
 }
 
-fn chinese(text: &str) -> bool {
+pub(super) fn chinese(text: &str) -> bool {
     text.chars().any(|c| ('\u{4e00}'..='\u{9fff}').contains(&c))
 }
 
@@ -118,7 +118,7 @@ const NO_SENTENCES: [&str; 10] = [
 const SENTENCE_MAX: usize = 220;
 
 /// The texts between quotation marks, with lines that are continued put together.
-fn literals(code: &str) -> Vec<String> {
+pub(super) fn literals(code: &str) -> Vec<String> {
     let (mut all, mut open, mut escaped): (Vec<String>, Option<String>, bool) = (Vec::new(), None, false);
     let code: String = code.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
     let mut before = ' ';
@@ -143,15 +143,20 @@ fn literals(code: &str) -> Vec<String> {
     all
 }
 
-/// `{name:?}` and `{0}` are `{}`.
-fn without_names(text: &str) -> String {
-    let mut pieces = text.split('{');
-    let mut all = pieces.next().unwrap_or_default().to_owned();
-    for piece in pieces {
-        all.push_str("{}");
-        all.push_str(piece.split_once('}').map_or(piece, |(_, rest)| rest));
+/// `{name:?}` and `{0}` are `{}`; braces that are written twice are braces of the text, and one that is never closed too.
+pub(super) fn without_names(text: &str) -> String {
+    let (mut all, mut rest) = (String::new(), text);
+    while let Some(at) = rest.find(['{', '}']) {
+        all.push_str(&rest[..at]);
+        let (brace, after) = rest[at..].split_at(1);
+        let place = after.split_once('}').filter(|_| brace == "{");
+        (rest, _) = match (after.strip_prefix(brace), place) {
+            (Some(after), _) => (after, all.push_str(brace)),
+            (None, Some((_, after))) => (after, all.push_str("{}")),
+            (None, None) => (after, all.push_str(brace)),
+        };
     }
-    all
+    all + rest
 }
 
 #[test]

@@ -1,19 +1,24 @@
 // What trials and a run over the history say about a draft.
 import { fill, make, row, say, table } from "/web/parts.js";
 import { duration, number } from "/web/format.js";
-import { language, localTimes, t } from "/web/words.js";
+import { language, localTimes, scriptWords, t } from "/web/words.js";
 
 export function showTrials(view, found) {
   const lines = found.trials.map((r) =>
     row(
       language() === "zh" ? make("code", "", `trial_${r.name.replaceAll(" ", "_")}`) : r.name,
       r.problem ? t("trial_failed") : t("trial_passed"),
-      r.problem ? `${t("line")} ${r.problem.line}: ${r.problem.what}` : t("trial_words", r.met, number(r.seconds, "s")),
+      r.problem
+        ? `${t("line")} ${r.problem.line}: ${scriptWords(r.problem.what)}`
+        : t("trial_words", r.met, number(r.seconds, "s")),
       { dot: r.problem ? "bad" : "good", tone: r.problem ? "bad" : "" },
     ),
   );
   const problems = found.problems.map((p) =>
-    row(`${t("line")} ${p.line}`, "", [p.what, p.next].filter(Boolean).join(" – "), { dot: "bad", tone: "bad" }),
+    row(`${t("line")} ${p.line}`, "", [p.what, p.next].filter(Boolean).map(scriptWords).join(" – "), {
+      dot: "bad",
+      tone: "bad",
+    }),
   );
   say(view.note, found.fine ? t("trials_fine", found.trials.length) : t("trials_failed"));
   fill(view.result, [

@@ -3,7 +3,7 @@
 //! A sensor is lost, jumps, freezes, or says something that the others contradict. An offset that follows it then is worse than one
 //! without it, and one that is withdrawn is worse than one that goes on with the others. So every sensor of a law is judged by three
 //! marks: the rate (heat does not jump), flatness (a sensor that has always varied stands still while the others say that it must have
-//! moved) and agreement with the others ([`SensorModel`]). In the place of one that is not believed stands what the others say, beginning
+//! moved; or one whose noise was always there shows none) and agreement with the others ([`SensorModel`]). In the place of one that is not believed stands what the others say, beginning
 //! with what it said last; the deviation of the prediction grows by what that costs.
 
 use super::sensor_model::SensorModel;
@@ -26,6 +26,12 @@ const FLAT_S: f64 = 120.0;
 /// while the others say that it has moved by this much at least, K, or by this share of what they can tell.
 const FLAT_MOVED_K: f64 = 1.0;
 const FLAT_MOVED_SD: f64 = 0.25;
+/// A sensor that shows noise goes up and down by turns. One that has always done so and shows no noise for so long is frozen, whatever the
+/// others say, and also where there are none, s. A slow sensor, or one with coarse steps, that stands still at night has no turns.
+const SILENT_S: f64 = 600.0;
+/// It shows noise where more than this share of its looks are turns: noise of half a step gives 0.44, of a step 0.56. One with less noise turns near the
+/// ends of its steps alone, and may stand still for hours in between; with half a step, no turn in 60 looks has a chance of 1e-10.
+const TURNS_LEAST: f64 = 0.45;
 /// How often a sensor varies is known after so many looks.
 const LOOKS_LEAST: f64 = 200.0;
 /// A sensor contradicts the others at so many deviations, and by so many kelvin at least: a machine that begins a hot day with all its parts
@@ -82,6 +88,9 @@ struct WatchedSensor {
     /// Looks while it was believed, and how many of them brought another value.
     looks: f64,
     changes: f64,
+    /// Changes that went the other way than the one before, and which way the last one went.
+    turns: f64,
+    last_change_k: f64,
     /// The longest time that it stood still while it was believed, s.
     longest_flat_s: f64,
 }
@@ -202,7 +211,7 @@ impl WatchedSensor {
         let fault = match () {
             () if self.has_jumped(at_ns, value_c) => Some(SensorFault::Jumped),
             () if look.is_worst => Some(SensorFault::Contradicted),
-            () if self.is_frozen(at_ns, expected) => Some(SensorFault::Frozen),
+            () if self.is_silent(at_ns) || self.is_frozen(at_ns, expected) => Some(SensorFault::Frozen),
             () => None,
         };
         match fault {
@@ -243,6 +252,9 @@ impl WatchedSensor {
             self.looks += 1.0;
             if let (None, Some(flat)) = (stands, self.flat) {
                 self.changes += 1.0;
+                let change_k = value_c - flat.value_c;
+                self.turns += f64::from(u8::from(change_k * self.last_change_k < 0.0));
+                self.last_change_k = change_k;
                 self.longest_flat_s = self.longest_flat_s.max(to_seconds(at_ns - flat.since_ns));
             }
         }
@@ -262,6 +274,16 @@ impl WatchedSensor {
         chance < FLAT_CHANCE
             && stood_s > FLAT_S.max(FLAT_TIMES * self.longest_flat_s)
             && moved_k > FLAT_MOVED_K.max(FLAT_MOVED_SD * expected.sd)
+    }
+
+    /// Has it lost the noise that it always showed?
+    fn is_silent(&self, at_ns: TimeNs) -> bool {
+        let Some(flat) = self.flat.filter(|_| self.looks >= LOOKS_LEAST) else { return false };
+        let stood_s = to_seconds(at_ns - flat.since_ns);
+        let turns = (self.turns / self.looks).clamp(0.0, 0.999);
+        turns > TURNS_LEAST
+            && (1.0 - turns).powf(flat.looks) < FLAT_CHANCE
+            && stood_s > SILENT_S.max(FLAT_TIMES * self.longest_flat_s)
     }
 
     /// What stands in for it: what the others say, beginning with what it said last.

@@ -217,3 +217,38 @@ fn a_law_that_does_not_tell_has_no_model() {
     watch.replace_doubted(SECOND_NS, &mut temperatures);
     assert_eq!(temperatures, [Ok(20.0), Err(Absence::OutOfRange), Ok(22.0)]);
 }
+
+/// Sensors of many kinds without a model: noise of .02 to .3 K, steps of .01 to .5 K. One that shows noise is told when it freezes; one with coarse
+/// steps may stand still for hours, and is not told without the others.
+#[test]
+fn a_sensor_whose_noise_is_gone_is_told_without_the_others() {
+    let mut told_of = [0, 0];
+    for seed in 0..40 {
+        let mut dice = Pcg64Mcg::seed_from_u64(700 + seed);
+        let (noise_k, step_k) = (dice.random_range(0.02..0.3), dice.random_range(0.01..0.5));
+        let mut watch = SensorWatch::new(None, 1);
+        let (mut stood, mut told_s) = (None, None);
+        for (step, true_c) in day(seed, 20.0, 8).iter().enumerate() {
+            let at_s = step * STEP_S;
+            // The machine stands still in the last two hours before the fault: its temperature hardly changes.
+            let warm_c = if at_s < 4 * 3600 { true_c[1] } else { 24.0 };
+            let noisy = warm_c + noise_k * dice.sample::<f64, _>(StandardNormal);
+            let mut shown = f64::round(noisy / step_k) * step_k;
+            if at_s >= 6 * 3600 {
+                shown = *stood.get_or_insert(shown);
+            }
+            watch.replace_doubted(at_s as i64 * SECOND_NS, &mut [Ok(shown)]);
+            let frozen = watch.list_doubted().iter().any(|it| it.fault == SensorFault::Frozen);
+            assert!(!frozen || at_s >= 6 * 3600, "{seed}: noise {noise_k} K, steps of {step_k} K, after {at_s} s");
+            told_s = told_s.or(frozen.then_some(at_s.saturating_sub(6 * 3600)));
+        }
+        if noise_k > step_k {
+            told_of[0] += 1;
+            assert!(told_s.is_some_and(|it| it <= 1200), "{seed}: noise {noise_k} K, steps of {step_k} K: {told_s:?}");
+        } else {
+            told_of[1] += usize::from(told_s.is_some());
+        }
+    }
+    println!("{} of 40 show noise beyond their steps and are told; of the others {}", told_of[0], told_of[1]);
+    assert!(told_of[0] >= 5, "{told_of:?}");
+}

@@ -3,6 +3,28 @@
 use super::super::bench::{Bench, LineFault};
 use adapters::simulated::Simulated;
 
+/// A machine to which faults come.
+pub(super) trait Breakable {
+    /// Its cuts take so many times the power.
+    fn change_cut(&mut self, factor: f64);
+    fn break_insert(&mut self, tool: u8);
+    fn change_edge(&mut self, tool: u8);
+}
+
+impl Breakable for Simulated {
+    fn change_cut(&mut self, factor: f64) {
+        self.change_machine(factor, 1.0);
+    }
+
+    fn break_insert(&mut self, tool: u8) {
+        Self::break_insert(self, tool);
+    }
+
+    fn change_edge(&mut self, tool: u8) {
+        Self::change_edge(self, tool);
+    }
+}
+
 /// What goes wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Kind {
@@ -47,27 +69,27 @@ impl Fault {
     }
 
     pub(super) fn begin(&self, bench: &mut Bench, tool: u8) {
-        bench.line_fault = self.begin_on(&bench.machine, tool);
+        bench.line_fault = self.begin_on(&mut bench.machine, tool);
     }
 
     pub(super) fn end(&self, bench: &mut Bench, tool: u8) {
         bench.line_fault = None;
-        self.end_on(&bench.machine, tool);
+        self.end_on(&mut bench.machine, tool);
     }
 
     /// Begins on the machine; gives what goes wrong behind it.
-    pub(super) fn begin_on(&self, machine: &Simulated, tool: u8) -> Option<LineFault> {
+    pub(super) fn begin_on(&self, machine: &mut impl Breakable, tool: u8) -> Option<LineFault> {
         match self.kind {
-            Kind::Cut(factor) => machine.change_machine(factor, 1.0),
+            Kind::Cut(factor) => machine.change_cut(factor),
             Kind::Insert => machine.break_insert(tool),
             Kind::Line(fault) => return Some(fault),
         }
         None
     }
 
-    pub(super) fn end_on(&self, machine: &Simulated, tool: u8) {
+    pub(super) fn end_on(&self, machine: &mut impl Breakable, tool: u8) {
         match self.kind {
-            Kind::Cut(_) => machine.change_machine(1.0, 1.0),
+            Kind::Cut(_) => machine.change_cut(1.0),
             Kind::Insert => machine.change_edge(tool),
             Kind::Line(_) => {}
         }
