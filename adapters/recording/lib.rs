@@ -10,7 +10,7 @@ pub mod read;
 pub use derive::{DERIVABLE, OF_OTHER_ROWS, derive_quantity, with_derived};
 pub use numbers::Numbers;
 pub use read::mapping::{ColumnMapping, Mapping, MappingError, TimeMapping};
-pub use read::plan::{Note, NoteKind};
+pub use read::note::{Note, NoteKind};
 pub use read::{ReadRecording, RecordingError, RowProblem, read_csv, read_path, read_path_as};
 
 use adapter_core::clock::{SECOND_NS, TimeNs};

@@ -7,12 +7,13 @@ use super::error::{RecordingError, RowProblem};
 use super::head::Head;
 use super::limits::{CELLS_MAX, DESCRIBED_MAX, WORDS_BYTES_MAX};
 use super::mapping::Mapping;
-use super::plan::{BlockPlan, Note, NoteKind, TimeKind};
+use super::note::{Note, NoteKind};
+use super::plan::{BlockPlan, TimeKind};
 use super::restart::name_runs;
 use super::row_class::{RowClass, classify_row};
-use super::row_times::{RawTimes, RowLines};
+use super::row_times::{RawTime, RawTimes, RowLines};
 use super::table::{Row, Table, VisitStep};
-use super::time::{RawTime, resolve_times};
+use super::time::resolve_times;
 use crate::{Cells, Recording};
 use adapter_core::clock::SECOND_NS;
 

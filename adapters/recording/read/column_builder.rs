@@ -3,8 +3,9 @@
 use super::cell::{Cell, Decimal, is_absent, parse_flag, written_number};
 use super::cell_unit::CellUnits;
 use super::convert::{is_nothing, show_cell, text_of};
+use super::note::{Note, NoteKind};
 use super::plain_number::scan_plain_number;
-use super::plan::{Note, NoteKind, PlannedColumn, PlannedKind};
+use super::plan::{PlannedColumn, PlannedKind};
 use crate::{Cells, Numbers, Words};
 
 /// The text of a cell, and its number where a survey has found it to be a plain one under a decimal point.

@@ -3,7 +3,7 @@
 use super::cell::{Cell, is_absent_number};
 use super::compact_moment::parse_compact;
 use super::moment::{WrittenMoment, written_moment};
-use super::time::RawTime;
+use super::row_times::RawTime;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 
 pub(super) fn is_nothing(cell: Cell<'_>) -> bool {

@@ -2,13 +2,12 @@
 
 use super::cell::{Cell, is_absent_number, written_number};
 use super::error::RecordingError;
-use super::head_form::{HeadForm, find_head_form, merge_group_line};
+use super::head_form::{HeadForm, HeadRow, HeadTime, extract_texts, find_head_form, merge_group_line};
 use super::limits::HEAD_ROWS;
 use super::mapping::Mapping;
 use super::moment::written_moment;
 use super::names::ForeignName;
-use super::row_class::is_annotation;
-use super::table::{OwnedCell, Table, VisitStep};
+use super::table::{OwnedCell, Row, Table, VisitStep};
 use adapter_core::bilingual::Bilingual;
 use adapter_core::channel::unit::Unit;
 
@@ -38,17 +37,6 @@ pub(super) struct Head {
     pub(super) time: Option<HeadTime>,
 }
 
-/// A column that counts samples: time is `start_s + step_s x`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct HeadTime {
-    pub(super) index: usize,
-    pub(super) start_s: f64,
-    pub(super) step_s: f64,
-}
-
-/// The line of a row in the file, and its cells.
-pub(super) type HeadRow = (u64, Vec<OwnedCell>);
-
 /// What a map says of the head.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct GivenHead<'m> {
@@ -64,6 +52,14 @@ impl<'m> GivenHead<'m> {
     pub(super) fn from_mapping(mapping: &'m Mapping) -> Self {
         Self { names: mapping.header_line, units: mapping.units_line, list: &mapping.names }
     }
+}
+
+/// First cells of the lines that InfluxDB writes before every table of its annotated CSV.
+const ANNOTATIONS: [&str; 3] = ["#group", "#datatype", "#default"];
+
+/// Does the row say of what kind the columns of the next table are?
+pub(super) fn is_annotation(row: &Row<'_>) -> bool {
+    matches!(row.cells.first(), Some(Cell::Text(text)) if ANNOTATIONS.contains(text))
 }
 
 /// The first rows that are no annotation.
@@ -204,15 +200,6 @@ fn to_owned_cell(cell: &Cell<'_>) -> OwnedCell {
         Cell::Instant(at_ns) => OwnedCell::Instant(*at_ns),
         Cell::Local(at_ns) => OwnedCell::Local(*at_ns),
     }
-}
-
-pub(super) fn extract_texts(cells: &[OwnedCell]) -> Vec<String> {
-    let text = |cell: &OwnedCell| match cell {
-        OwnedCell::Text(text) => text.split_whitespace().collect::<Vec<_>>().join(" "),
-        OwnedCell::Number(number) => number.to_string(),
-        _ => String::new(),
-    };
-    cells.iter().map(text).collect()
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -1,9 +1,20 @@
 //! Heads that are written by rules of their own: TwinCAT Scope, oscilloscopes of Rigol, two lines of names one above the other.
 
 use super::cell::written_number;
-use super::head::{HeadRow, HeadTime, extract_texts};
 use super::names::ForeignName;
+use super::table::OwnedCell;
 use adapter_core::channel::unit::{Dimension, Unit};
+
+/// A column that counts samples: time is `start_s + step_s x`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct HeadTime {
+    pub(super) index: usize,
+    pub(super) start_s: f64,
+    pub(super) step_s: f64,
+}
+
+/// The line of a row in the file, and its cells.
+pub(super) type HeadRow = (u64, Vec<OwnedCell>);
 
 /// What such a head says.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -17,6 +28,16 @@ pub(super) struct HeadForm {
     pub(super) time: Option<HeadTime>,
     /// The columns end at different rows, and the rows with them.
     pub(super) short: bool,
+}
+
+/// The texts of the cells of a row; nothing where a cell holds neither text nor number.
+pub(super) fn extract_texts(cells: &[OwnedCell]) -> Vec<String> {
+    let text = |cell: &OwnedCell| match cell {
+        OwnedCell::Text(text) => text.split_whitespace().collect::<Vec<_>>().join(" "),
+        OwnedCell::Number(number) => number.to_string(),
+        _ => String::new(),
+    };
+    cells.iter().map(text).collect()
 }
 
 /// The head of a program that is known, in the lines before the data.

@@ -1,7 +1,7 @@
 //! The map of a foreign file (`map/1`): how it is written, and which of its columns is which of ours. Whatever it says is not guessed.
 
 use super::moment::{WrittenDate, written_moment};
-use super::text::Separator;
+use super::separator::Separator;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 

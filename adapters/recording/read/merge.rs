@@ -1,7 +1,7 @@
 //! Columns of several clocks in one file, brought onto one: that of the slowest series that still is within a tenth of the fastest. Each value is
 //! taken at its times: interpolated between neighbours, flags and words held. Nothing is averaged: a mean over a step would look like a slow meter.
 
-use super::plan::{Note, NoteKind};
+use super::note::{Note, NoteKind};
 use crate::{Cells, Numbers, Recording, Words};
 
 /// A series with less than this share of the samples of the longest one does not give the clock.

@@ -8,7 +8,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `input`, `encoding`, `text` | bytes, characters, rows of cells |
+//! | `input`, `encoding`, `separator`, `splitter`, `text` | bytes, characters, rows of cells |
 //! | `formats` | workbooks, LabVIEW, MATLAB, MTConnect, Parquet as the same rows of cells |
 //! | `head`, `head_form` | where the data begin, which line names the columns, which holds units; heads of known programs |
 //! | `long` | one line for each value, turned into columns |
@@ -16,7 +16,7 @@
 //! | `survey`, `understand`, `targets`, `clock`, `numeric_time`, `names` | what a column is |
 //! | `row_class`, `one_pass`, `assemble`, `column_builder`, `row_times`, `time`, `restart`, `merge` | rows, time, tests one after the other, several clocks in one file |
 //! | `preview` | how a file is understood, for a person and for a map |
-//! | `limits` | how much is taken at most |
+//! | `limits`, `note` | how much is taken at most; a sentence to the user |
 
 mod assemble;
 pub mod cell;
@@ -37,15 +37,17 @@ pub(super) mod mapping;
 mod merge;
 mod moment;
 pub mod names;
+pub(super) mod note;
 mod numeric_time;
 mod one_pass;
 mod plain_number;
-pub(super) mod plan;
+mod plan;
 mod preview;
 mod repeated_stamps;
 mod restart;
 mod row_class;
 mod row_times;
+mod separator;
 mod splitter;
 mod survey;
 pub(super) mod table;
@@ -64,8 +66,9 @@ use assemble::Assembled;
 use head::Head;
 use input::Input;
 use mapping::Mapping;
+use note::{Note, NoteKind};
 use one_pass::{CountedTable, count_cells};
-use plan::{Note, NoteKind, ReadPlan};
+use plan::ReadPlan;
 use std::io::Read;
 use std::path::Path;
 use survey::Survey;

@@ -3,7 +3,8 @@
 use super::cell::Decimal;
 use super::clock::ForeignColumns;
 use super::error::RecordingError;
-use super::plan::{Note, NoteKind, TimeKind};
+use super::note::{Note, NoteKind};
+use super::plan::TimeKind;
 use adapter_core::channel::unit::{Dimension, Unit};
 
 /// A step so long, s, in whole numbers and without a unit, may as well be milliseconds.

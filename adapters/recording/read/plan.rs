@@ -3,36 +3,8 @@
 use super::cell::Decimal;
 use super::cell_unit::CellUnits;
 use super::moment::DateOrder;
-use super::time::RawTime;
-use adapter_core::bilingual::Bilingual;
-
-/// What a sentence about the reading is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NoteKind {
-    /// How the file was taken to be written.
-    Assumption,
-    /// A foreign column and what it became.
-    Column,
-    /// Cells or lines that are not used.
-    Loss,
-    /// Something that may be wrong, with what to do.
-    Doubt,
-}
-
-/// A sentence about the reading, for the user.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Note {
-    /// What sort of note it is.
-    pub kind: NoteKind,
-    /// The sentence in both languages.
-    pub text: Bilingual,
-}
-
-impl Note {
-    pub(super) fn new(kind: NoteKind, en: impl Into<String>, zh: impl Into<String>) -> Self {
-        Self { kind, text: Bilingual::new(en, zh) }
-    }
-}
+use super::note::Note;
+use super::row_times::RawTime;
 
 /// How the cells of a column become numbers or words.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,7 @@
 //! Rows that share a stamp because the file rounds its times.
 
 use super::merge::usual_step;
-use super::plan::{Note, NoteKind};
+use super::note::{Note, NoteKind};
 use std::ops::Range;
 
 /// Repeated stamps are spread when at least this share of the rows stands in such groups.

@@ -1,6 +1,6 @@
 //! Time that begins again in the middle of a file: several tests one after the other, of which each becomes a run.
 
-use super::plan::{Note, NoteKind};
+use super::note::{Note, NoteKind};
 use crate::Words;
 
 pub(super) fn note_restarts(count: usize, notes: &mut Vec<Note>) {

@@ -1,7 +1,7 @@
 //! What a row of a table is: data, or one of the things that stand between data.
 
 use super::cell::Cell;
-use super::head::Head;
+use super::head::{Head, is_annotation};
 use super::table::Row;
 
 /// What a row is.
@@ -40,14 +40,6 @@ fn repeats_header(row: &Row<'_>, head: &Head) -> bool {
         _ => false,
     };
     row.cells.len() >= head.names.len() && row.cells.iter().zip(&head.names).all(same)
-}
-
-/// First cells of the lines that InfluxDB writes before every table of its annotated CSV.
-const ANNOTATIONS: [&str; 3] = ["#group", "#datatype", "#default"];
-
-/// Does the row say of what kind the columns of the next table are?
-pub(super) fn is_annotation(row: &Row<'_>) -> bool {
-    matches!(row.cells.first(), Some(Cell::Text(text)) if ANNOTATIONS.contains(text))
 }
 
 /// A line of remarks among the data: a sign before it, and not as many cells as there are columns.

@@ -1,7 +1,19 @@
 //! Time and line of every row while a table is read, in few bytes: a file of two columns has twenty million rows.
 
-use super::time::RawTime;
 use adapter_core::clock::TimeNs;
+
+/// One row's time, as the file says it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum RawTime {
+    /// Seconds on a clock that begins anywhere.
+    Seconds(f64),
+    /// Nanoseconds since 1970, UTC.
+    Utc(TimeNs),
+    /// The same on the clock of the place.
+    Local(TimeNs),
+    /// Nanoseconds since midnight.
+    OfDay(i64),
+}
 
 /// Which of [`RawTime`] a time is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

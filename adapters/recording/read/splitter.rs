@@ -3,8 +3,8 @@
 use super::cell::Cell;
 use super::error::RecordingError;
 use super::limits::{COLUMNS_MAX, ROW_BYTES_MAX};
+use super::separator::Separator;
 use super::table::VisitStep;
-use super::text::Separator;
 use csv_core::ReadRecordResult;
 
 pub(super) enum SplitError {

@@ -2,7 +2,7 @@
 
 use super::cell::Cell;
 use super::error::RecordingError;
-use super::plan::Note;
+use super::note::Note;
 use adapter_core::bilingual::Bilingual;
 use adapter_core::clock::TimeNs;
 

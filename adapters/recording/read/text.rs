@@ -6,20 +6,12 @@ use super::error::RecordingError;
 use super::input::Input;
 use super::limits::{COLUMNS_MAX, HEAD_BYTES, ROW_BYTES_MAX};
 use super::moment::written_moment;
-use super::plan::{Note, NoteKind};
+use super::note::{Note, NoteKind};
+use super::separator::Separator;
 use super::splitter::{SplitError, Splitter};
 use super::table::{Row, Table, Visit, VisitStep};
 use adapter_core::bilingual::Bilingual;
 use std::io::Read;
-
-/// What stands between two cells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Separator {
-    /// This character.
-    Sign(u8),
-    /// Any number of spaces or tabs.
-    Space,
-}
 
 /// What may stand before a text in UTF-8.
 const UTF_8_MARK: &[u8] = b"\xef\xbb\xbf";
@@ -30,36 +22,6 @@ const CANDIDATES: [Separator; 5] =
 
 /// Rows that are judged for a separator.
 const JUDGED_ROWS: usize = 400;
-
-impl Separator {
-    fn to_bilingual(self) -> Bilingual {
-        match self {
-            Self::Sign(b',') => Bilingual::new("comma", "逗号分隔"),
-            Self::Sign(b';') => Bilingual::new("semicolon", "分号分隔"),
-            Self::Sign(b'\t') => Bilingual::new("tab", "制表符分隔"),
-            Self::Sign(b'|') => Bilingual::new("bar |", "竖线分隔"),
-            Self::Sign(other) => {
-                let other = char::from(other);
-                Bilingual::new(format!("separator {other}"), format!("分隔符{other}"))
-            }
-            Self::Space => Bilingual::new("spaces between the columns", "空格分隔"),
-        }
-    }
-
-    /// From the text of a map; `None`: no separator.
-    pub(super) fn from_text(text: &str) -> Option<Self> {
-        match text {
-            "space" | " " => Some(Self::Space),
-            "tab" => Some(Self::Sign(b'\t')),
-            _ => text
-                .as_bytes()
-                .first()
-                .copied()
-                .filter(|byte| text.len() == 1 && byte.is_ascii_punctuation() || *byte == b'\t')
-                .map(Self::Sign),
-        }
-    }
-}
 
 #[derive(Debug)]
 pub(super) struct TextTable {

@@ -2,27 +2,14 @@
 
 use super::mapping::TimeMapping;
 use super::merge::usual_step;
-use super::plan::{Note, NoteKind};
+use super::note::{Note, NoteKind};
 use super::repeated_stamps::spread_stamps;
 use super::restart::{divide_at, note_restarts};
-use super::row_times::{RawTimes, TimeSort};
+use super::row_times::{RawTime, RawTimes, TimeSort};
 use crate::Words;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use jiff::tz::{AmbiguousOffset, TimeZone};
 use std::collections::HashMap;
-
-/// One row's time, as the file says it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum RawTime {
-    /// Seconds on a clock that begins anywhere.
-    Seconds(f64),
-    /// Nanoseconds since 1970, UTC.
-    Utc(TimeNs),
-    /// The same on the clock of the place.
-    Local(TimeNs),
-    /// Nanoseconds since midnight.
-    OfDay(i64),
-}
 
 /// The time of every row.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -8,8 +8,9 @@ use super::super::error::RecordingError;
 use super::super::input::Input;
 use super::super::limits::CELLS_IN_MEMORY_MAX;
 use super::super::moment::{DateOrder, written_moment};
+use super::super::separator::Separator;
 use super::super::table::{MemoryTable, OwnedCell, Table, VisitStep};
-use super::super::text::{Separator, TextTable};
+use super::super::text::TextTable;
 use adapter_core::bilingual::Bilingual;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 

@@ -21,8 +21,9 @@ use super::error::RecordingError;
 use super::input::Input;
 use super::limits::{TEXT_IN_MEMORY_MAX, UNPACKED_BYTES_MAX};
 use super::mapping::Mapping;
+use super::separator::Separator;
 use super::table::Table;
-use super::text::{Separator, TextTable};
+use super::text::TextTable;
 
 /// Reads by a library of others. A damaged file may break off inside it, which is an answer about the file and not the end of
 /// this program (calamine 0.38 indexes into what an xls file says of itself).

@@ -3,7 +3,7 @@
 use super::super::error::RecordingError;
 use super::super::input::Input;
 use super::super::limits::CELLS_MAX;
-use super::super::plan::{Note, NoteKind};
+use super::super::note::{Note, NoteKind};
 use super::super::table::{ColumnCells, ColumnTable, OwnedCell};
 use ::parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type};
 use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};

@@ -4,7 +4,7 @@
 use super::super::error::RecordingError;
 use super::super::input::Input;
 use super::super::limits::{CELLS_IN_MEMORY_MAX, COLUMNS_MAX};
-use super::super::plan::{Note, NoteKind};
+use super::super::note::{Note, NoteKind};
 use super::super::table::{MemoryTable, OwnedCell};
 use adapter_core::bilingual::Bilingual;
 use calamine::Xlsx;
