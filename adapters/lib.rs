@@ -37,8 +37,8 @@ pub mod waveform;
 pub mod worker;
 
 pub use adapter_core::{
-    bilingual, channel, clock, conversion, driver, electric, histogram, merge, offset, own, plausibility, reading,
-    sample, text, threads, unique_id, units, words,
+    bilingual, channel, clock, conversion, driver, electric, histogram, merge, offset, override_pct, own, plausibility,
+    reading, sample, text, threads, unique_id, words,
 };
 pub use device_line;
 pub use fanuc;

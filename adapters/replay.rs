@@ -64,12 +64,6 @@ impl Replay {
         self.times_ns.len()
     }
 
-    /// How many rows have been read.
-    #[must_use]
-    pub fn rows_read(&self) -> usize {
-        self.row
-    }
-
     /// Time of a row on the mapped clock.
     #[must_use]
     pub fn time_ns(&self, row: usize) -> Option<TimeNs> {

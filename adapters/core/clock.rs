@@ -21,7 +21,7 @@ pub trait Clock: Send + Sync {
 }
 
 /// The machine's clock: the wall clock read once, then advanced by the monotonic clock, so that a step of the wall
-/// clock cannot reorder samples. [`SystemClock::wall_offset_ns`] tells how far the wall clock has stepped since.
+/// clock cannot reorder samples.
 #[derive(Debug)]
 pub struct SystemClock {
     started: Instant,
@@ -33,12 +33,6 @@ impl SystemClock {
     #[must_use]
     pub fn new() -> Self {
         Self { started: Instant::now(), started_ns: wall_ns() }
-    }
-
-    /// Wall clock minus this clock. A change of more than a second is a clock step worth an event.
-    #[must_use]
-    pub fn wall_offset_ns(&self) -> i64 {
-        wall_ns() - self.now_ns()
     }
 }
 

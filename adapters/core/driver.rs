@@ -2,9 +2,9 @@
 
 use crate::channel::ChannelId;
 use crate::clock::{Clock, TimeNs};
+use crate::override_pct::OverridePct;
 use crate::reading::{Absence, Reading};
 use crate::text::shorten_text;
-use crate::units::OverridePct;
 use std::time::Duration;
 use thiserror::Error;
 

@@ -17,6 +17,7 @@ pub mod merge;
 pub mod model_library;
 pub mod offset;
 pub mod opened_device;
+pub mod override_pct;
 pub mod own;
 pub mod percent;
 pub mod plausibility;
@@ -30,7 +31,6 @@ mod text_set;
 pub mod threads;
 pub mod tool_name;
 pub mod unique_id;
-pub mod units;
 pub mod words;
 
 pub use channel::{Channel, ChannelId};

@@ -26,7 +26,7 @@ use crate::address::{FanucOptions, WriteMethod};
 use adapter_core::clock::{Clock, TimeNs};
 use adapter_core::driver::{Actuator, LadderRequest, LadderRule, SourceError};
 use adapter_core::integer::{convert_bounded, saturate_to_ns};
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 use std::time::Duration;
 
 /// States of a mailbox, as the ladder's byte +4 tells them.

@@ -145,8 +145,6 @@ impl FocasReturnCode {
     pub const NOOPT: Self = Self(6);
     /// Code 11: there is no such path.
     pub const PATH: Self = Self(11);
-    /// Code 13: refused in the present state.
-    pub const REJECT: Self = Self(13);
     /// Connection lost, as the vendor's library says it.
     pub const SOCKET: Self = Self(-16);
 

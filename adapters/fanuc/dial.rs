@@ -6,7 +6,7 @@
 
 use super::feed_override;
 use super::item::{Area, Stretch};
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 
 /// A byte of PMC memory with the dial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,7 +4,7 @@
 //! 0 count like all bits 1: 0 %. A wrong byte is a feed hold in the middle of a cut, so this is the only place that
 //! makes one.
 
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 
 /// Address of the byte in the G area, of the first path.
 pub const AT: u16 = 12;

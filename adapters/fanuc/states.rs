@@ -4,8 +4,8 @@
 
 use super::answer::Status;
 use super::feed_override;
+use adapter_core::override_pct::OverridePct;
 use adapter_core::reading::Absence;
-use adapter_core::units::OverridePct;
 use adapter_core::words::{execution, mode, operation};
 
 /// A signal, or why it is not known.

@@ -5,7 +5,7 @@ use super::item::{channel, define_whole_item};
 use super::line::HncLine;
 use adapter_core::clock::Clock;
 use adapter_core::driver::{Actuator, LadderRequest, SourceError};
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 use nclink::mailbox::{ControllerRegister, Mailbox, MailboxRequest};
 
 /// Posts letters for the ladder; see [`mailbox`](nclink::mailbox).

@@ -6,8 +6,8 @@ use super::message::{RequestedItem, first_number};
 use super::registers::RegisterLine;
 use adapter_core::clock::Clock;
 use adapter_core::driver::{Actuator, LadderRequest, SourceError};
+use adapter_core::override_pct::OverridePct;
 use adapter_core::reading::Absence;
-use adapter_core::units::OverridePct;
 
 /// The override in force.
 const OVERRIDE: &str = "FEED_OVERRIDE";

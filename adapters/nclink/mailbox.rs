@@ -14,8 +14,8 @@
 //! The heartbeat is written last, in the same request: a letter counts when it moves.
 
 use adapter_core::driver::{LadderRequest, SourceError};
+use adapter_core::override_pct::OverridePct;
 use adapter_core::reading::Absence;
-use adapter_core::units::OverridePct;
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;

@@ -4,7 +4,7 @@ use super::Simulated;
 use super::ladder::LadderInput;
 use adapter_core::clock::Clock;
 use adapter_core::driver::{Actuator, LadderRequest, SourceError};
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 
 /// Posts overrides and requests to the ladder of the simulated machine, and reads back what is in force.
 pub struct SimulatedOverride {

@@ -14,7 +14,7 @@
 use adapter_core::clock::TimeNs;
 use adapter_core::driver::{LadderRequest, LadderRule};
 use adapter_core::integer::saturate_to_wait_ns;
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 use std::collections::VecDeque;
 use std::time::Duration;
 

@@ -41,7 +41,7 @@ pub use settings::{CutLevel, DaySettings, DeviceSettings, LaterChange, LostInser
 
 use adapter_core::clock::TimeNs;
 use adapter_core::offset::Axis;
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 use ladder::LadderInput;
 use machine::Machine;
 use moment::Integrals;

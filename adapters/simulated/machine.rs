@@ -11,7 +11,7 @@ use crate::address::SimulatedMachine;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use adapter_core::integer::{clamp_count, convert_bounded, length_to_i64};
 use adapter_core::offset::Axis;
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 use adapter_core::words::{execution, mode};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;

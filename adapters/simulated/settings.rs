@@ -213,14 +213,6 @@ impl Default for SimulatedSettings {
 }
 
 impl MeterSettings {
-    /// How far the meter's averages lie behind the stamps of its readings: the age of the window's end and half the
-    /// window. The true answer to the question for the lag between controller and meter is this minus the controller's
-    /// [`DeviceSettings::mean_age`].
-    #[must_use]
-    pub fn mean_lag(&self) -> Duration {
-        self.device.mean_age() + self.device.refresh / 2
-    }
-
     /// The same meter with this lag against that controller, or the least one that its window allows.
     #[must_use]
     pub fn with_lag(mut self, lag: Duration, controller: &DeviceSettings) -> Self {

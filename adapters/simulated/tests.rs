@@ -6,9 +6,9 @@ use adapter_core::channel::ChannelId;
 use adapter_core::clock::{ManualClock, SECOND_NS};
 use adapter_core::driver::{Actuator, LadderRequest, Pull, SourceError};
 use adapter_core::merge::{Delay, Lockstep};
+use adapter_core::override_pct::OverridePct;
 use adapter_core::reading::{Absence, Reading};
 use adapter_core::sample::Sample;
-use adapter_core::units::OverridePct;
 use std::collections::BTreeMap;
 
 fn machine(settings: SimulatedSettings) -> Simulated {

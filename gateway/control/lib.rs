@@ -80,17 +80,6 @@ pub enum Order {
 }
 
 impl Order {
-    /// Name of the person who orders, for the audit.
-    #[must_use]
-    pub fn ordered_by(&self) -> &str {
-        match self {
-            Self::Arm { by, .. }
-            | Self::Disarm { by }
-            | Self::Acknowledge { by }
-            | Self::AcknowledgeAlarm { by, .. } => by,
-        }
-    }
-
     /// The same with the user that the system knows beside the name.
     fn of_user(mut self, user: Option<u32>) -> Self {
         let (Self::Arm { by, .. } | Self::Disarm { by } | Self::Acknowledge { by } | Self::AcknowledgeAlarm { by, .. }) =

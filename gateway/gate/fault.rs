@@ -1,7 +1,7 @@
 //! What ends an arming on the way to the machine, in words for the operator.
 
 use super::arming::Disarmed;
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 use adapter_core::{Axis, LadderRule, SourceError};
 use std::fmt;
 

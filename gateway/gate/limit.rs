@@ -1,7 +1,7 @@
 //! The band and the slew limit: no script can widen them.
 
 use adapter_core::clock::{SECOND_NS, TimeNs};
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 
 /// The longest time between two decisions over which the slew limit still counts; after more, it begins at 100 %.
 const PAUSE_NS: i64 = SECOND_NS;

@@ -3,7 +3,7 @@
 use super::hold::Hold;
 use super::limit::Bound;
 use adapter_core::clock::TimeNs;
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 
 /// What became of the request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

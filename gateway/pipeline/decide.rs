@@ -190,7 +190,7 @@ mod tests {
     }
 
     fn verdict(at_ns: TimeNs) -> Verdict {
-        let permitted = adapter_core::units::OverridePct::FULL;
+        let permitted = adapter_core::override_pct::OverridePct::FULL;
         Verdict { at_ns, wanted_pct: None, permitted, outcome: gateway_gate::GateOutcome::Permitted, armed: false }
     }
 

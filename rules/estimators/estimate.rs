@@ -341,10 +341,4 @@ impl Estimates {
             _ => self.loads.figure_mut(name),
         }
     }
-
-    /// Is the no-load power extrapolated beyond the learned speeds?
-    #[must_use]
-    pub fn is_extrapolated(&self) -> bool {
-        self.no_load_origin == NoLoadOrigin::Extrapolated
-    }
 }

@@ -15,7 +15,7 @@
 use super::Memory;
 use adapter_core::clock::TimeNs;
 use adapter_core::driver::{LadderRequest, LadderRule};
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 use fanuc::feed_override;
 use fanuc::item::Area;
 use fanuc::ladder::{ENABLED, request_bit};

@@ -8,7 +8,7 @@ use super::panel_status::{build_status, round_to_number};
 use super::{screen, second_path};
 use adapter_core::clock::{Clock, TimeNs};
 use adapter_core::driver::{Actuator, LadderRequest, LadderRule};
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 use adapter_core::words::{execution, mode, operation};
 use fanuc::answer::Alarm;
 use fanuc::item::{Area, BlockWord};

@@ -4,7 +4,7 @@ use crate::{Controller, ServedControl, Server, ServerSettings, SimulatedControl}
 use adapter_core::clock::{Clock, ScaledClock, SystemClock};
 use adapter_core::driver::{Actuator, LadderRequest, SourceError};
 use adapter_core::offset::{Axis, OffsetSink};
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 use fanuc::address::parse_fanuc;
 use fanuc::item::Area;
 use fanuc::line::FanucLine;

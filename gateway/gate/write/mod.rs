@@ -20,7 +20,7 @@ use super::verdict::{GateOutcome, Verdict};
 use crate::limits::GateConfig;
 use adapter_core::clock::{Clock, SECOND_NS, TimeNs};
 use adapter_core::integer::saturate_to_ns as ns;
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 use adapter_core::{Actuator, LadderRequest, LadderRule, SourceError};
 use std::collections::VecDeque;
 use std::sync::Arc;

@@ -2,7 +2,7 @@
 
 use crate::fault::Fault;
 use adapter_core::clock::TimeNs;
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 
 /// Why the writer wrote.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

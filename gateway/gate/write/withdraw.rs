@@ -4,7 +4,7 @@
 use super::{Occasion, OverrideWriter, PendingWrite, WriteRecord};
 use crate::fault::Fault;
 use adapter_core::clock::{Clock, SECOND_NS, TimeNs};
-use adapter_core::units::OverridePct;
+use adapter_core::override_pct::OverridePct;
 use adapter_core::{Actuator, LadderRule, SourceError};
 
 /// A withdrawal that the machine refused is tried again after this time.

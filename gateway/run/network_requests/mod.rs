@@ -167,7 +167,7 @@ fn build_script_request(request: &NetworkRequest, pct: f64, reason: &str) -> Ove
 mod tests {
     use super::account::REASON_MAX;
     use super::*;
-    use adapters::units::OverridePct;
+    use adapters::override_pct::OverridePct;
     use gateway_control::{OUTCOMES_MAX, RequestRefusal};
     use gateway_gate::{Bound, GateOutcome, Hold, Reaction, Verdict};
     use gateway_history::Audit;

@@ -29,10 +29,4 @@ impl Inference {
     pub fn learn_load_anew(&mut self, program: &str) {
         self.state.loads.learn_anew(program);
     }
-
-    /// Forgets the learned no-load powers, as after work on the spindle; those of the settings stay.
-    pub fn forget_no_load(&mut self) {
-        self.state.no_load = NoLoadTable::new(&self.settings);
-        self.state.upper_bound = None;
-    }
 }

@@ -63,12 +63,6 @@ impl Regression {
         .filter(|prediction| prediction.value.is_finite() && prediction.observation_sd.is_finite())
     }
 
-    /// The greatest leverage of a row: a point beyond it is extrapolated (Montgomery, 3.8).
-    #[must_use]
-    pub fn greatest_leverage(&self) -> f64 {
-        self.leverage.iter().copied().fold(0.0, f64::max)
-    }
-
     /// Tests this law against a shorter one of the same rows. `None` where it is no longer.
     #[must_use]
     pub fn test_against(&self, shorter: &Self) -> Option<FTest> {

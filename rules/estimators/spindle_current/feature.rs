@@ -45,21 +45,7 @@ pub enum WindowSpan {
     },
 }
 
-impl WindowSpan {
-    /// The window of a motor with `pole_pairs` whose rotor turns at `motor_speed_rpm`. An induction motor slips by a few
-    /// percent, and the window is off by as much; a synchronous one does not.
-    ///
-    /// # Errors
-    /// A speed or number of pole pairs that is not positive.
-    pub fn of_speed(motor_speed_rpm: f64, pole_pairs: u32) -> Result<Self, Refusal> {
-        let hz = motor_speed_rpm.abs() / 60.0 * f64::from(pole_pairs);
-        if hz.is_finite() && hz > 0.0 {
-            return Ok(Self::Known { hz });
-        }
-        let what = format!("{motor_speed_rpm} rpm and {pole_pairs} pole pairs give no frequency");
-        Err(Refusal::new(RefusalKind::OutOfRange, what, "give the motor's speed while it turns"))
-    }
-}
+impl WindowSpan {}
 
 /// A feature over one window.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -98,12 +98,6 @@ impl SettingValues {
         self.chosen.get(&(section.to_owned(), name.to_owned(), place.clone())).map(|chosen| &chosen.value)
     }
 
-    /// The line on which a value stands, from 1.
-    #[must_use]
-    pub fn find_line(&self, section: &str, name: &str, place: &DeclarationPlace) -> Option<usize> {
-        self.chosen.get(&(section.to_owned(), name.to_owned(), place.clone())).map(|chosen| chosen.line)
-    }
-
     /// Every value: section, name, place, value.
     pub fn list_values(&self) -> impl Iterator<Item = (&str, &str, &DeclarationPlace, &SettingValue)> {
         self.chosen.iter().map(|((section, name, place), chosen)| (&**section, &**name, place, &chosen.value))

@@ -2,8 +2,8 @@
 
 use super::cut::{Random, TICK_NS, asking, cases, cutting, id, limits, set_number, set_text, stored};
 use adapters::clock::{Clock, ManualClock, SECOND_NS};
+use adapters::override_pct::OverridePct;
 use adapters::simulated::{Simulated, SimulatedSettings};
-use adapters::units::OverridePct;
 use adapters::{Absence, Actuator, LadderRule, Sample, Slot, SourceError};
 use gateway::config::{self, BUILT_IN_TEXT, GateMode};
 use gateway::gate::{

@@ -3,7 +3,7 @@
 
 use super::cut::{TICK_NS, asking, cutting, limits, stored};
 use adapters::clock::{Clock, ManualClock, SECOND_NS, SystemClock};
-use adapters::units::OverridePct;
+use adapters::override_pct::OverridePct;
 use adapters::{Actuator, Axis, LadderRequest, OffsetSink, SourceError};
 use gateway::config::GateMode;
 use gateway::gate::offset::{OffsetAccount, OffsetJournal, OffsetOrder};

@@ -2,7 +2,7 @@
 
 use super::cut::{Random, TICK_NS, cases, cutting, limits, set_number, stored};
 use adapters::clock::{Clock, ManualClock, SECOND_NS, TimeNs};
-use adapters::units::OverridePct;
+use adapters::override_pct::OverridePct;
 use adapters::{Actuator, SourceError};
 use gateway::config::GateMode;
 use gateway::gate::{Gate, GateOutcome, OverrideWriter};

@@ -9,7 +9,7 @@ use adapters::hnc::line::{HncLine, HncSettings};
 use adapters::hnc::sampling::Sampled;
 use adapters::hnc::{HncActuator, HncSource};
 use adapters::nclink::mailbox::ControllerRegister;
-use adapters::units::OverridePct;
+use adapters::override_pct::OverridePct;
 use adapters::{Absence, Reading, Source, SourceError};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};

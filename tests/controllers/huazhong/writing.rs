@@ -3,7 +3,7 @@
 use crate::huazhong::stand::{Stand, address, until};
 use adapters::driver::{Actuator, LadderRequest};
 use adapters::nclink::RequestedItem;
-use adapters::units::OverridePct;
+use adapters::override_pct::OverridePct;
 use adapters::{Address, SourceError};
 use serde_json::json;
 use std::time::Duration;

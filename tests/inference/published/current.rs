@@ -93,7 +93,7 @@ fn window() -> Vec<Row> {
     rows.push(Row::new("ripple of mean |i|, 30 samples, %", 0.01, ripple(30), 0.01, source));
     let crossings = ripple_of_feature(WindowSpan::Crossings { least_a: 0.1 });
     rows.push(Row::new("ripple of our feature, zero crossings, %", 0.01, crossings, 0.01, source));
-    let known = ripple_of_feature(WindowSpan::of_speed(1000.0, 2).expect("a frequency"));
+    let known = ripple_of_feature(WindowSpan::Known { hz: 2.0 * 1000.0 / 60.0 });
     rows.push(Row::new("ripple of our feature, from 1000 rpm, 2 pole pairs, %", 0.01, known, 0.01, source));
     rows
 }

@@ -47,9 +47,6 @@ pub struct Grades {
 /// The usual resolution coefficient; the source does not print its own.
 pub const RHO_USUAL: f64 = 0.5;
 
-/// Grades that lie closer together than this do not tell sensors apart.
-const DISCRIMINATION_MIN: f64 = 0.02;
-
 /// A first value must be at least this share of what the series spans: dividing by less makes the grades arbitrary.
 const FIRST_SHARE_MIN: f64 = 0.05;
 
@@ -57,13 +54,6 @@ const FIRST_SHARE_MIN: f64 = 0.05;
 const SAME: f64 = 1e-12;
 
 impl Grades {
-    /// Do the grades tell the sensors apart at all?
-    #[must_use]
-    pub fn can_discriminate(&self) -> bool {
-        let all = self.grades.iter().map(|grade| grade.grade);
-        all.clone().fold(f64::MIN, f64::max) - all.fold(f64::MAX, f64::min) >= DISCRIMINATION_MIN
-    }
-
     /// Names of the sensors, best first.
     #[must_use]
     pub fn order_sensors(&self) -> Vec<&str> {
