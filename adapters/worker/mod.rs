@@ -13,6 +13,7 @@ mod stats;
 #[cfg(test)]
 mod tests;
 
+pub use queue::Poll;
 pub use stats::{Spread, WorkerState, WorkerStats};
 
 use crate::clock::{Clock, SECOND_NS, TimeNs};
@@ -66,17 +67,6 @@ impl Default for WorkerSettings {
             period: None,
         }
     }
-}
-
-/// What one poll gave.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Poll {
-    /// When it was over.
-    pub ended_ns: TimeNs,
-    /// Its readings; also a failed poll may have some.
-    pub readings: Vec<Reading>,
-    /// Why the poll as a whole failed.
-    pub error: Option<SourceError>,
 }
 
 struct Shared {

@@ -1,8 +1,20 @@
 //! The bounded queue between a source's thread and the tick. When nobody takes, the oldest poll goes.
 
-use super::Poll;
+use crate::clock::TimeNs;
+use crate::driver::SourceError;
 use crate::reading::Reading;
 use std::collections::VecDeque;
+
+/// What one poll gave.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Poll {
+    /// When it was over.
+    pub ended_ns: TimeNs,
+    /// Its readings; also a failed poll may have some.
+    pub readings: Vec<Reading>,
+    /// Why the poll as a whole failed.
+    pub error: Option<SourceError>,
+}
 
 pub(super) struct Queue {
     polls: VecDeque<Poll>,

@@ -1,36 +1,10 @@
 //! The token that the first start prints. It may stand in the log of a container or on a screen, so it signs in once, within a day, at the
 //! form only; `cnc-gateway setup` and a new token for the same person end it at once.
 
-use super::persons::{Persons, PersonsError};
 use super::sign_in::{Access, SignInError};
-use super::token::Token;
 use gateway_base::clock::now_ns;
 use gateway_base::convert::instant_to_seconds;
-use serde::{Deserialize, Serialize};
 use std::net::IpAddr;
-use std::path::Path;
-
-/// What the entry of a person tells of such a token.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FirstToken {
-    /// Until when it signs in, seconds since 1970.
-    pub until_s: u64,
-    /// It has signed in.
-    #[serde(rename = "used")]
-    pub has_signed_in: bool,
-}
-
-impl FirstToken {
-    /// How long it signs in, s: a day, in which whoever sets the box up comes to it.
-    pub const LASTS_S: u64 = 24 * 3600;
-
-    /// May it sign in at this time, seconds since 1970?
-    #[must_use]
-    pub fn is_valid_at(&self, now_s: u64) -> bool {
-        !self.has_signed_in && now_s < self.until_s
-    }
-}
 
 impl Access {
     /// The token of the first start is good for the form, once, in its time; `by_form` says whether it came so.
@@ -58,22 +32,13 @@ impl Access {
     }
 }
 
-/// The persons of the file. Where there is none the first administrator is made.
-pub(super) fn read_or_create_persons(file: &Path) -> Result<(Persons, Option<Token>), PersonsError> {
-    if let Some(persons) = Persons::read(file)? {
-        return Ok((persons, None));
-    }
-    let mut persons = Persons::default();
-    let token = persons.add_first(instant_to_seconds(now_ns()))?;
-    persons.write(file)?;
-    Ok((persons, Some(token)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Role, Rules, Token, Urgency, persons_path};
+    use crate::persons::Persons;
+    use crate::{FirstToken, Role, Rules, Token, Urgency, persons_path};
     use gateway_control::create_queues;
+    use std::path::Path;
     use std::time::Duration;
 
     fn open(directory: &Path) -> (Access, Option<Token>) {

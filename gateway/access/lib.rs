@@ -23,7 +23,6 @@ mod sign_in;
 mod token;
 mod tries;
 
-pub use first_token::FirstToken;
 pub use persons::{
     FIRST, NAME_MAX, PERSONS_MAX, PersonDifference, PersonEntry, Persons, PersonsError, find_differences,
     permission_problem, persons_path,
@@ -32,7 +31,7 @@ pub use role::Role;
 pub use sessions::{SessionKey, digest_cookie};
 pub use sign_in::{Access, NewSession, Rules, SignInError, Urgency};
 
-pub use token::{Token, TokenError, random_bytes};
+pub use token::{FirstToken, Token, TokenError, random_bytes};
 pub use tries::{LOCKED_FOR, TRIES_MAX};
 
 /// Somebody who has been recognised.

@@ -3,9 +3,10 @@
 //! The file is the one truth. Whoever changes it - the page, `cnc-gateway person`, an editor - is followed within a second by
 //! the running gateway, which writes every difference into the audit; see [`find_differences`].
 
-use super::first_token::FirstToken;
 use super::role::Role;
-use super::token::{Token, TokenError};
+use super::token::{FirstToken, Token, TokenError};
+use gateway_base::clock::now_ns;
+use gateway_base::convert::instant_to_seconds;
 use gateway_base::files;
 use gateway_base::problem::StatusProblem;
 use serde::{Deserialize, Serialize};
@@ -304,6 +305,17 @@ pub fn find_differences(before: &Persons, now: &Persons) -> Vec<PersonDifference
         by: String::new(),
     });
     changed.chain(gone).collect()
+}
+
+/// The persons of the file. Where there is none the first administrator is made.
+pub(super) fn read_or_create_persons(file: &Path) -> Result<(Persons, Option<Token>), PersonsError> {
+    if let Some(persons) = Persons::read(file)? {
+        return Ok((persons, None));
+    }
+    let mut persons = Persons::default();
+    let token = persons.add_first(instant_to_seconds(now_ns()))?;
+    persons.write(file)?;
+    Ok((persons, Some(token)))
 }
 
 #[cfg(test)]

@@ -1,10 +1,9 @@
 //! From a name and a token to a session, and from a request to a person.
 
 use super::account::Account;
-use super::first_token::{FirstToken, read_or_create_persons};
-use super::persons::{NAME_MAX, Persons, PersonsError, find_differences, read_persons};
+use super::persons::{NAME_MAX, Persons, PersonsError, find_differences, read_or_create_persons, read_persons};
 use super::sessions::{SessionKey, Sessions, digest_cookie};
-use super::token::Token;
+use super::token::{FirstToken, Token};
 use super::tries::Tries;
 use super::{Person, Role};
 use gateway_base::files::{Mark, read_mark};

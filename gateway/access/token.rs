@@ -8,6 +8,7 @@
 use argon2::password_hash::PasswordVerifier;
 use argon2::password_hash::phc::PasswordHash;
 use argon2::{Algorithm, Argon2, Params, Version};
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt::{self, Write};
 
@@ -130,6 +131,28 @@ pub fn random_bytes<const N: usize>() -> Result<[u8; N], TokenError> {
     let mut bytes = [0; N];
     getrandom::fill(&mut bytes).map_err(|_| TokenError::NoRandomness)?;
     Ok(bytes)
+}
+
+/// What the entry of a person tells of such a token.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FirstToken {
+    /// Until when it signs in, seconds since 1970.
+    pub until_s: u64,
+    /// It has signed in.
+    #[serde(rename = "used")]
+    pub has_signed_in: bool,
+}
+
+impl FirstToken {
+    /// How long it signs in, s: a day, in which whoever sets the box up comes to it.
+    pub const LASTS_S: u64 = 24 * 3600;
+
+    /// May it sign in at this time, seconds since 1970?
+    #[must_use]
+    pub fn is_valid_at(&self, now_s: u64) -> bool {
+        !self.has_signed_in && now_s < self.until_s
+    }
 }
 
 #[cfg(test)]

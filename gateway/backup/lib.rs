@@ -9,6 +9,7 @@
 //! configuration is not put back: it says which machine is polled, and a restart with the wrong one would poll another.
 
 pub mod archive;
+mod error;
 mod handover;
 pub mod list;
 mod origin;
@@ -17,11 +18,11 @@ mod restore;
 mod schedule;
 mod target;
 
+pub use error::{BackupError, PutBack, RestoreError};
 pub use handover::install_waiting_files as take_restored;
 pub use origin::BoxOrigin;
-pub use put_back::PutBack;
-pub use restore::{RestoreError, RestoreRequest, restore_backup};
-pub use schedule::{BackupError, BackupSchedule, take_backup};
+pub use restore::{RestoreRequest, restore_backup};
+pub use schedule::{BackupSchedule, take_backup};
 
 use crate::archive::ArchivedFile;
 use gateway_base::convert::seconds_to_instant;

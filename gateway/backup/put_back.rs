@@ -2,35 +2,13 @@
 //! each is renamed into its place, and what was there is kept until the last one is. When one fails the kept ones come back, by a rename
 //! that needs no room.
 
-use super::RestoreError;
+use super::{PutBack, RestoreError};
 use gateway_base::files::{FreshFile, prepare_replacement};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Folder in the data directory for what is being replaced.
 const KEPT: &str = "restore-kept";
-
-/// What became of the files that had taken their places when a later one could not.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum PutBack {
-    /// So many, and all of them are as they were before.
-    All(usize),
-    /// These are still as the backup has them.
-    AllBut(Vec<PathBuf>),
-}
-
-impl std::fmt::Display for PutBack {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::All(0) => f.write_str("nothing was changed"),
-            Self::All(count) => write!(f, "{count} files that had been replaced were put back: all is as it was"),
-            Self::AllBut(paths) => {
-                let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
-                write!(f, "these could not be put back and are now as the backup has them: {}", names.join(", "))
-            }
-        }
-    }
-}
 
 /// A file that is being replaced or removed.
 struct ReplacedFile {

@@ -2,125 +2,24 @@
 
 use super::list::{Fate, of_name};
 use super::origin::ORIGIN;
-use super::put_back::{PutBack, Replacement};
+use super::put_back::Replacement;
 use super::{
-    BackupError, BackupPaths, BoxOrigin, DATA, DELIVERED, WEAR_MODELS, configured_files, handover, is_of_scripts,
+    BackupPaths, BoxOrigin, DATA, DELIVERED, RestoreError, WEAR_MODELS, configured_files, handover, is_of_scripts,
     list_names,
 };
 use crate::archive::ArchivedFile;
 use adapter_core::clock::TimeNs;
 use gateway_base::files::keep_last;
-use gateway_history::{HistoryError, Reader, store_wear_models};
+use gateway_history::{Reader, store_wear_models};
 use gateway_scripts::reload::read_directory;
 use gateway_scripts::settings;
 use rules::estimators::thermal::ThermalModel;
 use rules::estimators::wear::WearRecord;
 use rules::script::{ScriptFile, SettingValues, prepare_with};
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// Archives of what was replaced that are kept.
 const BEFORE_MAX: usize = 5;
-
-/// Why a backup does not come back.
-#[derive(Debug, Error)]
-pub enum RestoreError {
-    /// There is nothing in it that this box has a place for.
-    #[error(
-        "the archive holds nothing that this box has a place for: no script, recipe, model or file of a data directory"
-    )]
-    Empty,
-    /// A file that must be text.
-    #[error("{name} is no text")]
-    NoText {
-        /// Its name in the archive.
-        name: String,
-    },
-    /// A name that would lead elsewhere than to the scripts.
-    #[error("{name:?} is no name of a script")]
-    NoScript {
-        /// The name in the archive.
-        name: String,
-    },
-    /// A file of the data directory that no backup holds.
-    #[error("{name:?} is no file of a backup")]
-    NotOfBackup {
-        /// The name in the archive.
-        name: String,
-    },
-    /// A wear model that is none.
-    #[error("{name}: {what}")]
-    WearModel {
-        /// Its name in the archive.
-        name: String,
-        /// What is wrong with it.
-        what: String,
-    },
-    /// The law of the thermal error is none, or that of another machine.
-    #[error("the thermal model {0}")]
-    ThermalModel(String),
-    /// What was learned has been changed since it was written.
-    #[error("{name} is not as it was written: no JSON, or another checksum")]
-    Changed {
-        /// Its name in the archive.
-        name: String,
-    },
-    /// Scripts, settings, recipe or model that this version does not take; every problem on a line of its own.
-    #[error("{0}")]
-    Refused(String),
-    /// What is there now could not be kept. Nothing was changed.
-    #[error("what is there now could not be kept: {0}")]
-    NotKept(std::io::Error),
-    /// A file could not be written.
-    #[error("{}: {error}", path.display())]
-    File {
-        /// Which, or the directory that it is in.
-        path: PathBuf,
-        /// What the system says.
-        error: std::io::Error,
-    },
-    /// The wear models could not be read or stored.
-    #[error("the wear models: {0}")]
-    WearModels(#[from] HistoryError),
-    /// The number of this box cannot be read.
-    #[error("{0}")]
-    Origin(Box<BackupError>),
-    /// The archive is of another box, and nobody has said that this is meant.
-    #[error(
-        "the archive is {of}, and this box is {here}: scripts, settings and what was learned there would come into force here"
-    )]
-    OtherBox {
-        /// Which box the archive is of, in words.
-        of: String,
-        /// This box, in words.
-        here: String,
-    },
-    /// It broke off while files took their places.
-    #[error("{error}; {put_back}")]
-    BrokeOff {
-        /// What could not be done.
-        error: Box<RestoreError>,
-        /// What is there now.
-        put_back: PutBack,
-    },
-}
-
-impl RestoreError {
-    /// Adds the path to what the system says.
-    pub(super) fn of_file(path: &Path) -> impl Fn(std::io::Error) -> Self + '_ {
-        move |error| Self::File { path: path.to_owned(), error }
-    }
-
-    /// What is so after it: only what broke off half-way can have changed something, and says so itself.
-    #[must_use]
-    pub fn describe_state(&self) -> &'static str {
-        match self {
-            Self::BrokeOff { .. } => "",
-            Self::OtherBox { .. } => "nothing was changed; where that is meant, say so: --from-another-box",
-            _ => "nothing was changed",
-        }
-    }
-}
 
 /// Who restores, when, and the archive of what is there now with its name.
 #[derive(Debug, Clone, Copy)]

@@ -2,18 +2,16 @@
 //! a scratch folder before it counts.
 
 use super::target::{BackupKind, keep_newest, list_own, remove_half_written};
-use super::{BackupPaths, BoxOrigin, RestoreError, RestoreRequest, collect_files, copy_history, restore_backup};
+use super::{BackupError, BackupPaths, BoxOrigin, RestoreRequest, collect_files, copy_history, restore_backup};
 use crate::archive::{pack, unpack};
 use adapter_core::threads::{reach_fault_point, receive_work_within};
 use gateway_base::convert::seconds_to_instant;
 use gateway_base::log::{Notice, Severity};
 use gateway_config::BackupConfig;
-use gateway_history::HistoryError;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
 use std::time::{Duration, Instant};
-use thiserror::Error;
 
 /// Time between two looks whether a backup is due.
 const LOOK_EVERY: Duration = Duration::from_secs(60);
@@ -27,45 +25,6 @@ const TAKES_MAX: Duration = Duration::from_secs(600);
 const HISTORY_PACE: u64 = 1_000_000;
 /// The scratch folder in the data directory.
 const SCRATCH: &str = "backup-check";
-
-/// Why there is no backup.
-#[derive(Debug, Error)]
-pub enum BackupError {
-    /// The directory is not there: a stick that was taken out, a share that is not mounted.
-    #[error("{} is not there; put the stick in, mount the share, or change `directory` under [backup]", .0.display())]
-    Directory(PathBuf),
-    /// A file cannot be written or read.
-    #[error("{}: {error}", path.display())]
-    File {
-        /// The file or directory that was written or read.
-        path: PathBuf,
-        /// What the system says.
-        error: std::io::Error,
-    },
-    /// What was written does not come back.
-    #[error("the backup was written and could not be restored into a scratch folder: {0}")]
-    NotRestorable(RestoreError),
-    /// What was written cannot be unpacked.
-    #[error("the backup was written and could not be restored into a scratch folder: {0}")]
-    NotUnpacked(std::io::Error),
-    /// The target neither takes the backup nor refuses it.
-    #[error(
-        "{} has not answered for {after_s} s: it hangs. Unmount it (umount -l) and mount it again, or start the box anew without it",
-        directory.display()
-    )]
-    Hangs {
-        /// The directory that backups go to.
-        directory: PathBuf,
-        /// How long it was waited for, s.
-        after_s: u64,
-    },
-    /// The thread that takes the backup has ended without a word.
-    #[error("the backup to {} broke off; a report lies in `crashes` of the data directory", .0.display())]
-    BrokeOff(PathBuf),
-    /// The history cannot be copied, or its wear models cannot be read.
-    #[error("the history cannot be copied: {0}")]
-    History(#[from] HistoryError),
-}
 
 /// One backup: collected, written, restored into a scratch folder. Gives its path. A file takes its name only when it is whole and on the
 /// disk.

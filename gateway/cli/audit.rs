@@ -1,7 +1,6 @@
 //! `cnc-gateway history audit`: what the gate was asked for, let through and wrote, and whether the rows are as they were
 //! written.
 
-use super::history::to_cannot_run;
 use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
 use crate::history::{AuditCheck, AuditEntry, Reader, audit_document};
 use crate::moment;
@@ -30,18 +29,17 @@ pub(super) struct AuditArguments {
 
 pub(super) fn answer_audit(arguments: &AuditArguments, reader: &Reader) -> CommandResult {
     if arguments.verify {
-        let check = reader.verify_audit().map_err(|error| to_cannot_run(&error))?;
+        let check = reader.verify_audit().map_err(CannotRun::from_error)?;
         show_check(&check, arguments.json);
         return Ok(if check.broken.is_none() { CommandOutcome::Fine } else { CommandOutcome::No });
     }
-    let newest_ns =
-        reader.read_present_span().map_err(|error| to_cannot_run(&error))?.map_or(0, |(_, newest_ns)| newest_ns);
+    let newest_ns = reader.read_present_span().map_err(CannotRun::from_error)?.map_or(0, |(_, newest_ns)| newest_ns);
     let moment = |text: &Option<String>, otherwise: i64| {
         let parsed = text.as_ref().map(|text| moment::parse(text, newest_ns)).transpose();
         parsed.map(|ns| ns.unwrap_or(otherwise)).map_err(CannotRun::from_error)
     };
     let (from_ns, to_ns) = (moment(&arguments.from, i64::MIN)?, moment(&arguments.to, i64::MAX)?);
-    let rows = reader.read_audit(from_ns, to_ns, arguments.limit).map_err(|error| to_cannot_run(&error))?;
+    let rows = reader.read_audit(from_ns, to_ns, arguments.limit).map_err(CannotRun::from_error)?;
     match arguments.json {
         true => print_json(&audit_document(&rows)),
         false => rows.iter().for_each(|row| print_text(&format_row(row))),

@@ -127,7 +127,7 @@ struct PartitionArguments {
 
 impl PartitionArguments {
     fn write(&self, reader: &Reader) -> CommandResult {
-        let span = reader.read_present_span().map_err(|error| to_cannot_run(&error))?;
+        let span = reader.read_present_span().map_err(CannotRun::from_error)?;
         let Some((first_ns, newest_ns)) = span else {
             return Err(CannotRun::new("the history holds no samples", "let the gateway run first"));
         };
@@ -138,8 +138,7 @@ impl PartitionArguments {
         let (from_ns, to_ns) = (day(&self.from, first_ns)?, day(&self.to, newest_ns)?);
         let mut day_ns = from_ns.max(day_of(first_ns));
         while day_ns <= to_ns.min(newest_ns) {
-            let written =
-                reader.export_day(&self.directory, &self.machine, day_ns).map_err(|error| to_cannot_run(&error))?;
+            let written = reader.export_day(&self.directory, &self.machine, day_ns).map_err(CannotRun::from_error)?;
             let date: String = moment::format_utc(day_ns).chars().take(10).collect();
             print_text(&format!("{date}: {} samples, {} diagnoses\n", written.samples, written.diagnoses));
             day_ns += DAY_NS;
@@ -162,7 +161,7 @@ pub(super) fn run(arguments: HistoryArguments) -> CommandResult {
         // As every other command: the installed box, else the built-in configuration.
         None => load_configuration(None)?.history.path,
     };
-    let open = || Reader::open(path).map_err(|error| to_cannot_run(&error));
+    let open = || Reader::open(path).map_err(CannotRun::from_error);
     let reader = match arguments.question {
         Question::Repair(repair) => return super::history_upkeep::repair_history(&repair, path),
         Question::SetApart(apart) => return super::history_upkeep::set_apart(&apart, path),
@@ -184,7 +183,7 @@ fn answer_question(question: Question, reader: &Reader, path: &Path) -> CommandR
         Question::Info { json } => print_info(reader, json),
         Question::Export(export) => {
             let (query, _) = export.selection.build_query(reader)?;
-            let rows = reader.export_to_file(&query, &export.file).map_err(|error| to_cannot_run(&error))?;
+            let rows = reader.export_to_file(&query, &export.file).map_err(CannotRun::from_error)?;
             print_text(&format!("{rows} rows written to {}\n", export.file.display()));
             Ok(CommandOutcome::Fine)
         }
@@ -194,12 +193,8 @@ fn answer_question(question: Question, reader: &Reader, path: &Path) -> CommandR
     }
 }
 
-pub(super) fn to_cannot_run(error: &HistoryError) -> CannotRun {
-    CannotRun::new(error.to_string(), "")
-}
-
 fn print_info(reader: &Reader, json: bool) -> CommandResult {
-    let info = reader.read_info().map_err(|error| to_cannot_run(&error))?;
+    let info = reader.read_info().map_err(CannotRun::from_error)?;
     if json {
         let mut document = json!({ "schema": "history-info/1" });
         if let (Value::Object(document), Ok(Value::Object(fields))) = (&mut document, serde_json::to_value(&info)) {
@@ -219,7 +214,7 @@ const SAMPLES_BEHIND_NS: TimeNs = 60 * SECOND_NS;
 impl Selection {
     /// The question, and its range with both ends named.
     fn build_query(&self, reader: &Reader) -> Result<(Query, (TimeNs, TimeNs)), CannotRun> {
-        let span = reader.read_present_span().map_err(|error| to_cannot_run(&error))?;
+        let span = reader.read_present_span().map_err(CannotRun::from_error)?;
         let (first_ns, newest_ns) = span.unwrap_or((0, 0));
         let moment = |text: &Option<String>| {
             text.as_ref().map(|text| moment::parse(text, newest_ns).map_err(CannotRun::from_error)).transpose()
@@ -255,7 +250,7 @@ impl QueryArguments {
                 .map(|series| print_json(&samples::build_document(range, 0.0, series))),
             (None, None, None) => reader.export_csv(&query, out, path).map(drop),
         };
-        done.map(|()| CommandOutcome::Fine).map_err(|error| to_cannot_run(&error))
+        done.map(|()| CommandOutcome::Fine).map_err(CannotRun::from_error)
     }
 
     fn answer_records(

@@ -1,6 +1,5 @@
 //! `cnc-gateway history repair` and `set-apart`: when a disk or a clock was wrong.
 
-use super::history::to_cannot_run;
 use super::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
 use crate::history::{Repaired, repair_history as save, set_apart as move_apart};
 use crate::{clock, moment};
@@ -30,7 +29,7 @@ pub(super) struct SetApartArguments {
 
 /// Saves what is whole; exit code 1 when something is lost.
 pub(super) fn repair_history(arguments: &RepairArguments, path: &Path) -> CommandResult {
-    let repaired = save(path, &arguments.new).map_err(|error| to_cannot_run(&error))?;
+    let repaired = save(path, &arguments.new).map_err(CannotRun::from_error)?;
     if arguments.json {
         print_json(&json!({ "schema": "history-repair/1", "whole": repaired.is_whole(), "tables": repaired.tables,
             "damaged": repaired.damaged }));
@@ -62,7 +61,7 @@ pub(super) fn set_apart(arguments: &SetApartArguments, path: &Path) -> CommandRe
     let now_ns = clock::now_ns();
     let after = arguments.after.as_deref().map(|text| moment::parse(text, now_ns)).transpose();
     let after_ns = after.map_err(CannotRun::from_error)?.unwrap_or(now_ns);
-    let apart = move_apart(path, &arguments.new, after_ns).map_err(|error| to_cannot_run(&error))?;
+    let apart = move_apart(path, &arguments.new, after_ns).map_err(CannotRun::from_error)?;
     print_text(&format!(
         "{} samples and {} records that are dated after {} are in {} now\n",
         apart.samples,

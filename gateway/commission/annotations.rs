@@ -2,7 +2,7 @@
 //!
 //! One line of JSON each in `annotations.jsonl` of the data directory; lines are added and never changed.
 
-use super::columns::TorqueFileError;
+use super::torque_file::{TorqueFileError, torque_course};
 use adapter_core::clock::TimeNs;
 use clap::ValueEnum;
 use gateway_base::moment::{self, MomentError};
@@ -261,7 +261,7 @@ fn parse_torque(given: TypedAnnotation, newest_ns: TimeNs) -> Result<Annotation,
         Some(other) => return Err(AnnotationError::TorqueUnit { unit: other.to_owned() }),
     }
     let file = std::path::absolute(&file).map_err(|error| AnnotationError::File { path: file.clone(), error })?;
-    super::columns::torque_course(&file)?;
+    torque_course(&file)?;
     Ok(Annotation {
         quantity: Quantity::Torque,
         at_ns: newest_ns,

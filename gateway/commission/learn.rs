@@ -2,6 +2,7 @@
 
 use super::columns::{self, Merged};
 use super::picture::{Dot, Picture};
+use super::torque_file::TorqueFileError;
 use crate::identification::{self, THERMAL, TOOL_WEAR};
 use gateway_history::STATE_SERIES;
 use recording::{Cells, Numbers, Recording};
@@ -312,7 +313,7 @@ pub enum PrepareError {
     History(#[from] gateway_history::HistoryError),
     /// A torque file can no longer be read.
     #[error(transparent)]
-    TorqueFile(#[from] columns::TorqueFileError),
+    TorqueFile(#[from] TorqueFileError),
 }
 
 /// The history with everything annotated.

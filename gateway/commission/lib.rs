@@ -9,6 +9,7 @@
 //! |---|---|
 //! | `annotations` | what a person has measured, one line each in `annotations.jsonl` |
 //! | `columns` | the history as a recording, with what was annotated as columns |
+//! | `torque_file` | the file of a torque sensor |
 //! | `learn` | the parts of the job: learned, or why not |
 //! | `plan` | the cuts and idle runs to make |
 //! | `picture` | the fits as a page |
@@ -20,3 +21,6 @@ pub mod learn;
 pub mod picture;
 pub mod plan;
 pub mod pulses;
+mod torque_file;
+
+pub use torque_file::TorqueFileError;

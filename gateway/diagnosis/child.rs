@@ -22,7 +22,6 @@ use rules::twin::{self, Model, parse_model};
 use serde::{Deserialize, Serialize};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
 
 /// A tenth of the claim to the processor that everything else has; with less, a busy box would never finish.
 const NICE: i32 = 10;
@@ -30,9 +29,6 @@ const NICE: i32 = 10;
 const SEED: u64 = 1;
 /// The longest line that is read: a diagnosis as JSON is some ten kilobytes.
 const LINE_MAX: u64 = 16 << 20;
-/// The word of the command line.
-pub const COMMAND: &str = "diagnosis-child";
-
 /// What is to be diagnosed.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct DiagnosisJob {
@@ -97,42 +93,13 @@ pub enum ChildMessage {
 }
 
 /// What a child may be asked for.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Deserialize)]
 #[serde(untagged)]
 pub enum ChildJob {
     /// What a recording says about a model, by the twin.
     Diagnosis(Box<DiagnosisJob>),
     /// How a file is understood.
     Preview(PreviewJob),
-}
-
-/// The program that runs now, also where its file has been replaced meanwhile.
-///
-/// # Errors
-/// The system does not say where it lies.
-pub fn find_own_program() -> std::io::Result<PathBuf> {
-    if cfg!(target_os = "linux") { Ok(PathBuf::from("/proc/self/exe")) } else { std::env::current_exe() }
-}
-
-/// Starts a child on a job.
-///
-/// # Errors
-/// No process could be started.
-pub fn start(job: &impl Serialize) -> std::io::Result<Child> {
-    let mut child = Command::new(find_own_program()?)
-        .arg(COMMAND)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()?;
-    let line = serde_json::to_string(job)? + "\n";
-    let told = child.stdin.as_mut().map_or(Ok(()), |pipe| pipe.write_all(line.as_bytes()));
-    if let Err(error) = told {
-        let _already_gone = child.kill();
-        let _reaped = child.wait();
-        return Err(error);
-    }
-    Ok(child)
 }
 
 /// Every line of the child until it ends or says the outcome.

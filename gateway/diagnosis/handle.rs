@@ -3,9 +3,9 @@
 
 use super::beside::Onset;
 use super::child::Stage;
+use super::request::{ChildFailure, DiagnosisRequest, LoadedModel};
 use super::store::DiagnosisStore;
 use super::stretch;
-use super::worker::{ChildFailure, DiagnosisRequest, LoadedModel};
 use adapter_core::bilingual::Bilingual;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_base::files::{read_text, replace_durably};

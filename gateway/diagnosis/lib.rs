@@ -4,6 +4,7 @@
 pub mod arriving;
 pub mod beside;
 pub mod child;
+pub mod child_process;
 pub mod clicked_map;
 pub mod context;
 pub mod execute;
@@ -21,6 +22,7 @@ mod outputs;
 pub mod preview;
 mod recordings;
 pub mod report;
+pub mod request;
 pub mod series;
 pub mod series_alignment;
 pub mod simulation;

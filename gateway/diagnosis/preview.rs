@@ -1,7 +1,7 @@
 //! How a file that somebody brought is understood: read by a child process with limits, so that no file can take the memory or the time
 //! of the box. The answer is kept beside the file, and so is that a file has broken its child: neither is worked out twice.
 
-use super::child::{self, ChildJob};
+use super::child_process::start_child;
 use super::clicked_map::ClickedMap;
 use super::map_file::{MapProposal, ProposedColumn};
 use adapter_core::bilingual::Bilingual;
@@ -101,15 +101,11 @@ fn read_map_beside(path: &Path) -> Mapping {
 
 /// Why a child gave no answer.
 fn ask_child(path: &Path, name: &str, clicked: Option<&ClickedMap>) -> Result<Value, Bilingual> {
-    let job = ChildJob::Preview(PreviewJob {
-        preview: path.to_owned(),
-        name: name.to_owned(),
-        clicked_map: clicked.cloned(),
-    });
+    let job = PreviewJob { preview: path.to_owned(), name: name.to_owned(), clicked_map: clicked.cloned() };
     let broken = |error: std::io::Error| {
         Bilingual::new(format!("no process to read it with: {error}"), format!("无法启动读取进程：{error}"))
     };
-    let mut child = child::start(&job).map_err(broken)?;
+    let mut child = start_child(&job).map_err(broken)?;
     let mut line = String::new();
     let read = child.stdout.take().map(|output| BufReader::new(output.take(ANSWER_MAX)).read_line(&mut line));
     // Its standard input is open until here: it ends when that is closed.

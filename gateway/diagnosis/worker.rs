@@ -1,16 +1,17 @@
 //! Beside the tick: looks whether the model file has changed, and has diagnoses made in the background, one stretch at a time, in
 //! a process that has only the processor time that nobody else wants.
 
-use super::beside::Onset;
 use super::child::{self, ChildMessage, DiagnosisJob, JobInput, Stage};
+use super::child_process::start_child;
 use super::handle::DiagnosisHandle;
 use super::outputs;
+use super::request::{ChildFailure, DiagnosisRequest, LoadedModel};
 use super::store::{self, DiagnosisFile, DiagnosisStore};
 use adapter_core::clock::TimeNs;
 use adapter_core::threads::receive_work_within;
 use gateway_base::files::{LOOK_EVERY, Mark, Rest, read_mark};
 use gateway_history::Reader;
-use rules::twin::{self, Model, parse_model};
+use rules::twin::{self, parse_model};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Weak};
@@ -18,32 +19,6 @@ use std::time::{Duration, Instant};
 
 /// So long the newest samples may take to become durable before a diagnosis goes on without them.
 const WAIT_MAX: Duration = Duration::from_secs(10);
-
-/// A model as read from its file.
-#[derive(Debug, Clone)]
-pub struct LoadedModel {
-    /// The parsed model, checked.
-    pub model: Model,
-    /// The text that the model was read from (model/1).
-    pub toml: String,
-}
-
-/// A stretch to be diagnosed.
-#[derive(Debug, Clone)]
-pub struct DiagnosisRequest {
-    /// The model in charge, as text.
-    pub toml: String,
-    /// The person who asks for it; `None`: the box itself.
-    pub by: Option<String>,
-    /// Beginning of the stretch, ns since 1970.
-    pub from_ns: TimeNs,
-    /// End of the stretch, ns since 1970.
-    pub to_ns: TimeNs,
-    /// Since when the watch sees which kinds of work differ.
-    pub onsets: Vec<Onset>,
-    /// A file in place of a stretch: its path, and the simulated series beside it.
-    pub file: Option<(PathBuf, Option<String>)>,
-}
 
 /// What the worker has to tell.
 #[derive(Debug)]
@@ -220,29 +195,12 @@ fn diagnose_stretch(request: DiagnosisRequest, places: &WorkerPaths, diagnoses: 
 /// Row of the history and what is missing.
 pub(super) type FoundDiagnosis = (gateway_history::Diagnosis, Vec<String>);
 
-/// Why a process has given no diagnosis.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub(super) enum ChildFailure {
-    /// A person has ended it, before the process was started or while it ran.
-    #[error("{by} has ended it")]
-    Ended { by: String },
-    /// The system gave no process.
-    #[error("no process for the diagnosis: {0}")]
-    NotStarted(String),
-    /// The process says why nothing can be diagnosed.
-    #[error("{0}")]
-    Refused(String),
-    /// The process ended without an answer; with its exit status, empty where that is not known.
-    #[error("its process broke off ({0})")]
-    BrokeOff(String),
-}
-
 pub(super) fn in_child(job: &DiagnosisJob, diagnoses: &DiagnosisHandle) -> Result<FoundDiagnosis, ChildFailure> {
     let ended_by = |diagnoses: &DiagnosisHandle| diagnoses.cancelled_by().map(|by| ChildFailure::Ended { by });
     if let Some(ended) = ended_by(diagnoses) {
         return Err(ended);
     }
-    let mut child = child::start(job).map_err(|error| ChildFailure::NotStarted(error.to_string()))?;
+    let mut child = start_child(job).map_err(|error| ChildFailure::NotStarted(error.to_string()))?;
     let output = child.stdout.take();
     diagnoses.put_child(child);
     let mut outcome = None;

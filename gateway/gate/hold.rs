@@ -1,6 +1,6 @@
 //! The reasons that hold 100 %, whatever a script asks for.
 
-use super::thread_cycle::ThreadCycle;
+use super::thread_cycle::{Cycle, ThreadCycle};
 use adapter_core::state::State;
 use adapter_core::words::{execution, mode, of_channel, operation};
 use adapter_core::{Absence, ChannelId, Sample};
@@ -163,7 +163,10 @@ impl Interlocks {
         if operation.eq_ignore_ascii_case(operation::TAPPING) {
             return Some(Hold::Tapping);
         }
-        self.cycle.hold()
+        self.cycle.active_cycle().map(|cycle| match cycle {
+            Cycle::Threading => Hold::Threading,
+            Cycle::Tapping => Hold::Tapping,
+        })
     }
 
     fn find_data_hold(&self, sample: &Sample) -> Option<Hold> {

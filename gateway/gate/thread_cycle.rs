@@ -4,14 +4,13 @@
 //! lathes and mills and of Huazhong are taken together; where a code means a thread on one of them and something
 //! harmless on another, it counts as a thread, because holding 100 % is always safe.
 
-use super::hold::Hold;
-
 /// What the last blocks have said; modal codes stay until another motion replaces them.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ThreadCycle(Option<Cycle>);
 
+/// What is being cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Cycle {
+pub(super) enum Cycle {
     Threading,
     Tapping,
 }
@@ -40,11 +39,9 @@ impl ThreadCycle {
         }
     }
 
-    pub(super) fn hold(self) -> Option<Hold> {
-        self.0.map(|cycle| match cycle {
-            Cycle::Threading => Hold::Threading,
-            Cycle::Tapping => Hold::Tapping,
-        })
+    /// The cycle that the control is in.
+    pub(super) fn active_cycle(self) -> Option<Cycle> {
+        self.0
     }
 }
 
@@ -95,13 +92,13 @@ mod tests {
         let mut cycle = ThreadCycle::default();
         let mut held = |block: &str| {
             cycle.follow_block(block);
-            cycle.hold()
+            cycle.active_cycle()
         };
         assert_eq!(held("G0 X10"), None);
-        assert_eq!(held("G84 X1 Y1 Z-10 R2 F1.25"), Some(Hold::Tapping));
-        assert_eq!(held("X20"), Some(Hold::Tapping));
+        assert_eq!(held("G84 X1 Y1 Z-10 R2 F1.25"), Some(Cycle::Tapping));
+        assert_eq!(held("X20"), Some(Cycle::Tapping));
         assert_eq!(held("G80"), None);
-        assert_eq!(held("N10 G33 Z-20 F1.5"), Some(Hold::Threading));
+        assert_eq!(held("N10 G33 Z-20 F1.5"), Some(Cycle::Threading));
         assert_eq!(held("G1 X0"), None);
     }
 }

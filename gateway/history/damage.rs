@@ -1,11 +1,11 @@
 //! What a disk has changed: how it is recognised, and how it is told.
 
 use super::error::{HistoryError, add_path};
-use super::info::format_utc;
 use super::lock::append_suffix;
+use super::readable_time::format_utc;
 use adapter_core::clock::TimeNs;
 use gateway_base::{clock, moment};
-use rusqlite::{Connection, ErrorCode, ffi};
+use rusqlite::Connection;
 use serde::Serialize;
 use std::fmt;
 use std::io::Read;
@@ -45,24 +45,6 @@ impl fmt::Display for DamagedRows {
             None => Ok(()),
         }
     }
-}
-
-/// What to do about damage, as the end of a sentence.
-pub(crate) const REPAIR: &str = "`cnc-gateway history repair NEW` saves everything that is whole into a new file";
-
-/// Does `SQLite` say that the file is not as it was written?
-pub(crate) fn is_of_disk(error: &rusqlite::Error) -> bool {
-    let extended = error.sqlite_error().map(|error| error.extended_code);
-    extended == Some(ffi::SQLITE_IOERR_DATA)
-        || matches!(error.sqlite_error_code(), Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase))
-        // A value of another type than its column, a number that is none of its kind, or text that is no text: only a changed file
-        // has that.
-        || matches!(
-            error,
-            rusqlite::Error::InvalidColumnType(..)
-                | rusqlite::Error::IntegralValueOutOfRange(..)
-                | rusqlite::Error::FromSqlConversionFailure(..)
-        )
 }
 
 /// What `SQLite` keeps beside a database.

@@ -1,9 +1,27 @@
 //! What can go wrong with a history, in words that say what to do next.
 
-use super::damage::{REPAIR, is_of_disk};
 use super::pages::damaged_page;
+use rusqlite::{ErrorCode, ffi};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
+
+/// What to do about damage, as the end of a sentence.
+pub(crate) const REPAIR: &str = "`cnc-gateway history repair NEW` saves everything that is whole into a new file";
+
+/// Does `SQLite` say that the file is not as it was written?
+pub(crate) fn is_of_disk(error: &rusqlite::Error) -> bool {
+    let extended = error.sqlite_error().map(|error| error.extended_code);
+    extended == Some(ffi::SQLITE_IOERR_DATA)
+        || matches!(error.sqlite_error_code(), Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase))
+        // A value of another type than its column, a number that is none of its kind, or text that is no text: only a changed file
+        // has that.
+        || matches!(
+            error,
+            rusqlite::Error::InvalidColumnType(..)
+                | rusqlite::Error::IntegralValueOutOfRange(..)
+                | rusqlite::Error::FromSqlConversionFailure(..)
+        )
+}
 
 /// Why a history cannot be opened, written or read.
 #[derive(Debug, Error)]

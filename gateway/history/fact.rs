@@ -1,10 +1,7 @@
 //! Facts of production in the database, see [`Fact`]: stored once, read by time.
 
-use super::error::{Doing, HistoryError};
-use super::list::RecordSpan;
-use super::reader::Reader;
 use gateway_records::{Fact, FactKind};
-use rusqlite::{Connection, OptionalExtension, Row, params};
+use rusqlite::{Connection, Row, params};
 
 /// Stores it once, whatever comes twice.
 pub(crate) fn store_fact(db: &Connection, fact: &Fact) -> Result<(), rusqlite::Error> {
@@ -26,7 +23,7 @@ pub(crate) fn store_fact(db: &Connection, fact: &Fact) -> Result<(), rusqlite::E
     .map(drop)
 }
 
-fn read_fact(row: &Row<'_>) -> Result<Fact, rusqlite::Error> {
+pub(super) fn read_fact(row: &Row<'_>) -> Result<Fact, rusqlite::Error> {
     let word: String = row.get(3)?;
     Ok(Fact {
         at_ns: row.get(0)?,
@@ -40,42 +37,4 @@ fn read_fact(row: &Row<'_>) -> Result<Fact, rusqlite::Error> {
         way: row.get(7)?,
         author: row.get(8)?,
     })
-}
-
-impl Reader {
-    /// Does the file have the table? One of an older version that nobody has written since does not.
-    fn has_facts(&self) -> Result<bool, HistoryError> {
-        self.db
-            .query_row("SELECT 1 FROM sqlite_schema WHERE name = 'facts'", [], |_| Ok(()))
-            .optional()
-            .map(|found| found.is_some())
-            .with_activity("looking for facts")
-    }
-
-    /// Facts that happened or began in the range, the newest `limit` of them, oldest first.
-    ///
-    /// # Errors
-    /// What `SQLite` says.
-    pub fn read_facts(&self, span: RecordSpan) -> Result<Vec<Fact>, HistoryError> {
-        self.select_facts("from_ns", span)
-    }
-
-    /// Facts that the box was told in the range, the newest `limit` of them, oldest first.
-    ///
-    /// # Errors
-    /// What `SQLite` says.
-    pub fn read_facts_told(&self, span: RecordSpan) -> Result<Vec<Fact>, HistoryError> {
-        self.select_facts("at_ns", span)
-    }
-
-    fn select_facts(&self, time: &str, span: RecordSpan) -> Result<Vec<Fact>, HistoryError> {
-        if !self.has_facts()? {
-            return Ok(Vec::new());
-        }
-        let select = format!(
-            "SELECT at_ns, from_ns, until_ns, fact, value, parts, mark, way, author FROM facts
-             WHERE {time} >= ?1 AND {time} < ?2 ORDER BY {time} DESC, id DESC LIMIT ?3"
-        );
-        self.read_records(&select, span, read_fact)
-    }
 }

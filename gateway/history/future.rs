@@ -1,7 +1,7 @@
 //! Rows that say they come from the future: a clock that was wrong, and believed, when they were stored.
 
 use super::error::{Doing, HistoryError};
-use super::info::format_utc;
+use super::readable_time::format_utc;
 use super::schema;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use rusqlite::{Connection, params};

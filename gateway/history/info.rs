@@ -2,6 +2,7 @@
 
 use super::error::{Doing, HistoryError};
 use super::options::DAY_NS;
+use super::readable_time::format_utc;
 use super::reader::Reader;
 use super::retention::used_bytes;
 use super::space::disk_room;
@@ -161,11 +162,6 @@ impl Reader {
 
 const UNSEALED: &str = "SELECT sum(rows) FROM tail
     WHERE first_row >= coalesce((SELECT first_row + rows FROM blocks ORDER BY first_row DESC LIMIT 1), 0)";
-
-/// A time as a person reads it.
-pub(crate) fn format_utc(at_ns: TimeNs) -> String {
-    jiff::Timestamp::from_nanosecond(i128::from(at_ns)).map_or_else(|_| format!("{at_ns} ns"), |at| at.to_string())
-}
 
 fn format_bytes(bytes: f64) -> String {
     if bytes < 1e9 { format!("{:.1} MB", bytes / 1e6) } else { format!("{:.2} GB", bytes / 1e9) }

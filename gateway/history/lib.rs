@@ -45,6 +45,7 @@
 mod audit;
 #[cfg(test)]
 mod audit_tests;
+mod audit_reading;
 mod block;
 mod commit;
 mod compact;
@@ -53,9 +54,11 @@ mod earlier;
 mod error;
 mod export;
 mod fact;
+mod fact_reading;
 mod ffi;
 mod future;
 mod info;
+mod levels;
 mod list;
 mod lock;
 mod mailbox;
@@ -67,6 +70,7 @@ mod overview;
 mod pages;
 mod pyramid;
 mod query;
+mod readable_time;
 mod reader;
 mod reason;
 mod record_sql;
@@ -80,6 +84,7 @@ mod schema;
 mod seal;
 mod segments;
 mod series;
+mod series_kind;
 mod set_apart;
 mod space;
 mod sql;
@@ -104,7 +109,7 @@ pub use gateway_records::{
 };
 pub use info::{Dropped, Info, TableRows};
 pub use list::{AlarmEntry, RecordSpan, StateHour, StateInterval};
-pub use options::{DAY_NS, ExtraSeries, ExtraValue, Fidelity, Options, Retention, SeriesKind, WhenFull};
+pub use options::{DAY_NS, Options, Retention, WhenFull};
 pub use outbox::parse_nested_json;
 pub use outbox::{
     Cell, Content, DeliveryState, Gap, Item, ItemMove, NOT_RUNNING, Outbox, OutboxFigures, OutboxHead, OutboxReader,
@@ -120,6 +125,7 @@ pub use rounding::round_to_decimals;
 pub use rusqlite::types::Value as SqlValue;
 pub use schema::page_layer;
 pub use series::{Series, as_stored, decimals_of_unit};
+pub use series_kind::{ExtraSeries, ExtraValue, Fidelity, SeriesKind};
 pub use set_apart::{SetApart, set_apart};
 pub use space::{DiskRoom, disk_room};
 pub use sql::SQL_WITHIN;

@@ -1,9 +1,10 @@
 //! Between the threads that hand samples in and the one that writes them: bounded, and locked only for moments.
 
-use super::options::{ExtraValue, Options, WhenFull};
+use super::options::{Options, WhenFull};
 use super::reason::Reasons;
 use super::rows::SeriesRows;
 use super::series::Series;
+use super::series_kind::ExtraValue;
 use adapter_core::Sample;
 use adapter_core::clock::TimeNs;
 use gateway_records::Record;

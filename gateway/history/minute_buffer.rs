@@ -2,8 +2,8 @@
 
 use super::block::{Block, Encoder, LEVEL_FRESH};
 use super::error::HistoryError;
+use super::levels::MINUTE_NS;
 use super::mailbox::QueuedRecord;
-use super::pyramid::MINUTE_NS;
 use super::reason::Reasons;
 use super::rows::SeriesRows;
 use super::series::Series;

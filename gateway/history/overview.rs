@@ -2,11 +2,11 @@
 
 use super::block::{Cells, ValueSummary};
 use super::error::{Doing, HistoryError};
-use super::options::SeriesKind;
-use super::pyramid::Level;
+use super::levels::Level;
 use super::query::{Chunk, Query};
 use super::reader::Reader;
 use super::series::Series;
+use super::series_kind::SeriesKind;
 use super::walk::Walk;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use rusqlite::params;

@@ -2,10 +2,10 @@
 
 use super::block::Cells;
 use super::error::HistoryError;
-use super::options::SeriesKind;
 use super::reader::Reader;
 use super::reason::Reasons;
 use super::series::Series;
+use super::series_kind::SeriesKind;
 use super::walk::{SegmentStretch, Walk};
 use adapter_core::channel::find_nearest_name;
 use adapter_core::clock::TimeNs;

@@ -8,9 +8,10 @@
 use super::audit;
 use super::block::{BLOCK_COLUMNS, Decoder, Encoder, LEVEL_FRESH, StoredBlock};
 use super::error::{Doing, HistoryError};
+use super::levels::MINUTE_NS;
 use super::lock::Lock;
 use super::outbox::{self, ItemMove, RedatedItems};
-use super::pyramid::{self, MINUTE_NS};
+use super::pyramid;
 use super::record_sql::add_to_state_hours;
 use super::recover::recover_file;
 use super::schema;

@@ -1,9 +1,9 @@
 //! Rows on their way to a block, column by column. Buffers are recycled: pushing a tick allocates nothing once every
 //! series has been seen.
 
-use super::options::{ExtraValue, SeriesKind};
 use super::reason::{NOT_PROVIDED, OUT_OF_RANGE, PRESENT, Reasons, code_of};
 use super::series::Series;
+use super::series_kind::{ExtraValue, SeriesKind};
 use adapter_core::clock::TimeNs;
 use adapter_core::{Absence, ChannelId, Sample, Value};
 use std::ops::Range;
@@ -224,14 +224,14 @@ impl SeriesRows {
 
 #[cfg(test)]
 mod tests {
-    use super::super::options::{ExtraSeries, Options};
     use super::super::series::stored_series;
+    use super::super::series_kind::{ExtraSeries, Fidelity};
     use super::*;
     use adapter_core::Slot;
 
     fn series() -> Vec<Series> {
         let extras = vec![ExtraSeries::new_number("a_w", "W", "", ""), ExtraSeries::new_text("state", "", "")];
-        stored_series(&Options { extras, ..Options::default() }).expect("fine")
+        stored_series(Fidelity::Resolution, &extras).expect("fine")
     }
 
     fn rows(count: usize) -> SeriesRows {

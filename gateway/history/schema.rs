@@ -1,10 +1,11 @@
 //! Opening the file: what it must be, and the tables it gets when it is new.
 
-use super::damage::{is_of_disk, was_ours};
-use super::error::{Doing, HistoryError};
+use super::damage::was_ours;
+use super::error::{Doing, HistoryError, is_of_disk};
 use super::lock::append_suffix;
-use super::options::SeriesKind;
+use super::pages::SEALED_APPLICATION;
 use super::series::Series;
+use super::series_kind::SeriesKind;
 use super::{audit, earlier, pages, record_sql};
 use rusqlite::{Connection, ErrorCode, OpenFlags, OptionalExtension, params};
 use std::path::Path;
@@ -13,8 +14,6 @@ use std::path::Path;
 pub(crate) const SCHEMA: i64 = 6;
 /// `cncg`, stored as `application_id` of files of older versions, whose pages have no sums.
 pub(crate) const APPLICATION: i64 = 0x636e_6367;
-/// `cncs`, stored as `application_id` of files whose pages have sums ([`pages`]).
-pub(crate) const SEALED_APPLICATION: u32 = 0x636e_6373;
 const TABLES: &str = include_str!("schema.sql");
 /// What each schema adds to the one before, beginning with 2. A new file gets all of it.
 const ADDED: [&str; 5] = [

@@ -1,8 +1,8 @@
 //! What is stored per tick: every channel of the table, then the estimates registered at opening.
 
 use super::error::HistoryError;
-use super::options::{ExtraSeries, Fidelity, Options, SeriesKind};
 use super::rounding::{PLACES_MAX, round_to_decimals};
+use super::series_kind::{ExtraSeries, Fidelity, SeriesKind};
 use adapter_core::ChannelId;
 use adapter_core::channel::{Channel, Kind};
 use std::sync::Arc;
@@ -83,17 +83,16 @@ pub fn as_stored(channel: ChannelId, number: f64) -> f64 {
 }
 
 /// Every series a writer stores, channels first. The `id` is still 0.
-pub(crate) fn stored_series(options: &Options) -> Result<Vec<Series>, HistoryError> {
-    let mut series: Vec<Series> =
-        ChannelId::list_all().map(|id| Series::of_channel(id.channel(), options.fidelity)).collect();
-    for extra in &options.extras {
+pub(crate) fn stored_series(fidelity: Fidelity, extras: &[ExtraSeries]) -> Result<Vec<Series>, HistoryError> {
+    let mut series: Vec<Series> = ChannelId::list_all().map(|id| Series::of_channel(id.channel(), fidelity)).collect();
+    for extra in extras {
         if extra.name.is_empty() || series.iter().any(|known| *known.name == *extra.name) {
             let name = &extra.name;
             return Err(HistoryError::Question(format!(
                 "the stored series {name:?} has no name or the name of another one; give every estimate its own name"
             )));
         }
-        series.push(Series::of_extra(extra, options.fidelity));
+        series.push(Series::of_extra(extra, fidelity));
     }
     Ok(series)
 }
@@ -105,13 +104,13 @@ mod tests {
     #[test]
     fn an_estimate_may_not_take_the_name_of_a_channel() {
         let extras = vec![ExtraSeries::new_number("spindle_power_w", "W", "", "")];
-        let error = stored_series(&Options { extras, ..Options::default() }).expect_err("refused").to_string();
+        let error = stored_series(Fidelity::Resolution, &extras).expect_err("refused").to_string();
         assert!(error.contains("spindle_power_w"), "{error}");
     }
 
     #[test]
     fn channels_keep_their_place() {
-        let series = stored_series(&Options::default()).expect("fine");
+        let series = stored_series(Fidelity::Resolution, &[]).expect("fine");
         assert_eq!(series.len(), ChannelId::count_channels());
         assert!(series.iter().zip(ChannelId::list_all()).all(|(series, channel)| *series.name == *channel.name()));
     }

@@ -1,9 +1,10 @@
 //! Rows from the future go into a file of their own: the history begins where it should, and nothing is lost.
 
 use super::error::{Doing, HistoryError};
+use super::levels::{LEVELS, Level, MINUTE_NS};
 use super::lock::Lock;
 use super::outbox;
-use super::pyramid::{self, LEVELS, Level, MINUTE_NS};
+use super::pyramid;
 use super::recover::recover_file;
 use super::schema;
 use super::segments::RECORD_TABLES;

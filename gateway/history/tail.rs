@@ -4,11 +4,11 @@
 //! Form: `{"t":[times],"s":{"<series>":[cells] or cell},"c":sum}`; a cell alone holds for every row. A cell is a number, a
 //! text, or `{"m":"reason"}`. The sum is the CRC-32 of the text before its comma; older versions wrote none.
 
-use super::options::SeriesKind;
 use super::reason::{NOT_PROVIDED, PRESENT, Reasons};
 use super::rounding::round_to_decimals;
 use super::rows::{Column, SeriesRows, Word};
 use super::series::Series;
+use super::series_kind::SeriesKind;
 use serde_json::Value as Json;
 use std::fmt::Write;
 use std::ops::Range;
@@ -150,15 +150,15 @@ fn column_of(cell: &Json, count: usize, kind: SeriesKind, reasons: &mut Reasons)
 
 #[cfg(test)]
 mod tests {
-    use super::super::options::{ExtraSeries, ExtraValue, Options};
     use super::super::series::stored_series;
+    use super::super::series_kind::{ExtraSeries, ExtraValue, Fidelity};
     use super::*;
     use adapter_core::{Absence, ChannelId, Sample, Slot, Value};
 
     #[test]
     fn the_tail_gives_back_every_row() {
         let extras = vec![ExtraSeries::new_number("a_w", "W", "", ""), ExtraSeries::new_text("state", "", "")];
-        let mut series = stored_series(&Options { extras, ..Options::default() }).expect("fine");
+        let mut series = stored_series(Fidelity::Resolution, &extras).expect("fine");
         (1..).zip(&mut series).for_each(|(id, series)| series.id = id);
         let mut reasons = Reasons::default();
         let mut rows = SeriesRows::for_series(&series);
@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn a_damaged_tail_is_refused() {
-        let series = stored_series(&Options::default()).expect("fine");
+        let series = stored_series(Fidelity::Resolution, &[]).expect("fine");
         for text in ["", "{}", "{\"t\":[1.5],\"s\":{}}", "{\"t\":[1],\"s\":3}"] {
             let mut rows = SeriesRows::for_series(&series);
             assert_eq!(parse_rows_into(text, &mut rows, &series, &mut Reasons::default()), None, "{text}");

@@ -5,11 +5,10 @@
 //! are read; only the series a statement uses are decoded.
 
 use super::block::Cells;
-use super::damage::REPAIR;
-use super::error::HistoryError;
-use super::options::SeriesKind;
+use super::error::{HistoryError, REPAIR};
 use super::schema;
 use super::series::Series;
+use super::series_kind::SeriesKind;
 use super::walk::{SegmentStretch, Walk};
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use rusqlite::types::{Value, ValueRef};

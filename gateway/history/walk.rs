@@ -2,8 +2,8 @@
 
 use super::block::{BLOCK_COLUMNS, Cells, Decoder, Directory, NumberCells, StoredBlock, WordCells};
 use super::compact::{COMPACT_NS, own_codes};
-use super::damage::{DamagedRows, is_of_disk};
-use super::error::{Doing, HistoryError};
+use super::damage::DamagedRows;
+use super::error::{Doing, HistoryError, is_of_disk};
 use super::reason::{NOT_PROVIDED, PRESENT, Reasons};
 use super::recover::read_unsealed;
 use super::rows::{Column, SeriesRows, Word};

@@ -6,10 +6,11 @@ use super::lock::Lock;
 use super::mailbox::{Mailbox, WriterJob};
 use super::maintenance::Maintenance;
 use super::minute_buffer::MinuteBuffer;
-use super::options::{ExtraValue, Options};
+use super::options::Options;
 use super::outbox::Gatherer;
 use super::recover::recover_file;
 use super::series::stored_series;
+use super::series_kind::ExtraValue;
 use super::status::{HistoryFigures, SharedStatus};
 use super::thread::{CommitSchedule, Thread};
 use super::{schema, segments};
@@ -63,7 +64,7 @@ impl Writer {
         }
         let lock = Lock::acquire_at(path)?;
         let mut db = schema::open_for_writing(path)?;
-        let mut series = stored_series(&options)?;
+        let mut series = stored_series(options.fidelity, &options.extras)?;
         schema::register_series(&mut db, &mut series)?;
         schema::note_limit(&db, options.retention.max_bytes)?;
         let end = recover_file(&mut db, options.goes_on.then_some(options.origin.as_str()))?;

@@ -84,7 +84,8 @@ async fn begin_backtest(
 ) -> Result<Response, ApiProblem> {
     check_name(&name)?;
     let shown = shared.clone();
-    let plan = super::rules::run_blocking(move || plan_backtest(&shown, &name, &asked).map(|plan| (plan, name))).await;
+    let plan =
+        super::blocking::run_blocking(move || plan_backtest(&shown, &name, &asked).map(|plan| (plan, name))).await;
     let (plan, name) = plan?;
     {
         let mut run = shared.backtests.lock_run();

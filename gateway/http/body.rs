@@ -2,13 +2,12 @@
 //! pace have limits.
 
 use super::ServerState;
+use super::blocking::run_blocking;
 use super::problem::ApiProblem;
-use super::rules::run_blocking;
-use super::uploaded_files::describe_arrival_error;
 use axum::body::{Body, BodyDataStream, Bytes};
 use axum::extract::Request;
 use axum::http::{HeaderMap, header};
-use gateway_diagnosis::arriving::ArrivingFile;
+use gateway_diagnosis::arriving::{ArrivalError, ArrivingFile};
 use std::sync::Arc;
 use std::time::Duration;
 use thiserror::Error;
@@ -137,6 +136,14 @@ async fn write_block(mut file: ArrivingFile, mut block: Vec<u8>) -> Result<(Arri
         Ok((file, block))
     })
     .await
+}
+
+pub(super) fn describe_arrival_error(error: ArrivalError) -> ApiProblem {
+    let hint = match error {
+        ArrivalError::NoRoom { .. } => "make room on the disk of the data directory, or bring a shorter file",
+        ArrivalError::Io(_) => "look at the data directory",
+    };
+    ApiProblem::unavailable(error.to_string(), hint)
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use gateway_base::files::replace_privately;
 use gateway_base::limits::{MEMORY_TOLD_MB, TimeLimits};
 use gateway_config::Problem;
-use gateway_diagnosis::child::find_own_program;
+use gateway_diagnosis::child_process::find_own_program;
 use serde::Deserialize;
 use std::io;
 use std::path::Path;

@@ -8,12 +8,12 @@
 //! file whose content is sent as a password: who may edit the page may not read every file of the box.
 
 use super::ServerState;
+use super::blocking::run_blocking;
 use super::check_child::{check_saved_file, check_text as check_text_in_child};
 use super::guard::with_audit_note;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::route::Route;
-use super::rules::run_blocking;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;

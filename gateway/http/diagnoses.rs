@@ -144,7 +144,7 @@ async fn read_kept_file(shared: ServerState, key: String, part: DiagnosisFile) -
     let of_files = shared.files.as_ref().map(|files| files.handle().clone());
     let stores: Vec<_> = shared.diagnoses.iter().cloned().chain(of_files).collect();
     let wanted = key.clone();
-    let text = super::rules::run_blocking(move || {
+    let text = super::blocking::run_blocking(move || {
         Ok(stores.iter().find_map(|store| store.diagnosis_store().read_file(&wanted, part)))
     })
     .await?;
@@ -208,14 +208,14 @@ async fn accept_model(
         }
         diagnoses.accept_model(&key, &text).map_err(describe_diagnosis_refusal)
     };
-    respond_with_order(super::rules::run_blocking(accepted).await?)
+    respond_with_order(super::blocking::run_blocking(accepted).await?)
 }
 
 /// `DELETE /api/v1/twin/model`: the model that was in charge before takes its place again.
 async fn restore_model(State(shared): State<ServerState>, SignedIn(_): SignedIn) -> Result<Response, ApiProblem> {
     let diagnoses = shared.require_diagnoses()?.clone();
     let restored = move || diagnoses.restore_model().map_err(describe_diagnosis_refusal);
-    respond_with_order(super::rules::run_blocking(restored).await?)
+    respond_with_order(super::blocking::run_blocking(restored).await?)
 }
 
 fn respond_with_order(done: String) -> Result<Response, ApiProblem> {

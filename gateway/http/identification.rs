@@ -3,9 +3,9 @@
 //! `identify` and `commission --write` keep these answers: see [`gateway_commission::identification`].
 
 use super::ServerState;
+use super::blocking::run_blocking;
 use super::problem::ApiProblem;
 use super::route::Route;
-use super::rules::run_blocking;
 use axum::Json;
 use axum::extract::{Path, State};
 use axum::routing::get;

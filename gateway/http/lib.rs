@@ -8,6 +8,7 @@
 //! demands stands in the row of the table of routes, see [`Route`].
 
 mod backtests;
+mod blocking;
 mod body;
 mod check_child;
 mod configuration_file;

@@ -2,6 +2,7 @@
 //! archive for whoever helps from afar. None of it holds a token, a key or a password.
 
 use super::ServerState;
+use super::blocking::run_blocking;
 use super::diagnoses::respond_with_download;
 use super::guard::with_audit_note;
 use super::history::{HistoryQuery, describe_history_error};
@@ -9,7 +10,6 @@ use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
-use super::rules::run_blocking;
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{Query as Pairs, State};

@@ -2,11 +2,11 @@
 //! right. The tick takes a changed file by itself.
 
 use super::ServerState;
+use super::blocking::run_blocking;
 use super::guard::with_audit_note;
 use super::person::JsonBody;
 use super::problem::ApiProblem;
 use super::route::Route;
-use super::rules::run_blocking;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;

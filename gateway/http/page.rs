@@ -40,7 +40,7 @@ async fn serve_web_file(Path(name): Path<String>, asked: HeaderMap) -> Response 
     let Some(file) = FILES.iter().find(|file| file.name == name) else {
         return ApiProblem::not_found(&format!("/web/{name}")).into_response();
     };
-    let tag = format!("\"{:016x}\"", gateway_scripts::reload::compute_digest(file.content.as_bytes()));
+    let tag = format!("\"{:016x}\"", gateway_base::files::compute_digest(file.content.as_bytes()));
     let known = asked.get(header::IF_NONE_MATCH).and_then(|value| value.to_str().ok());
     let mut response = if known == Some(tag.as_str()) {
         StatusCode::NOT_MODIFIED.into_response()

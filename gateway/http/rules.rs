@@ -2,6 +2,7 @@
 //! versions.
 
 use super::ServerState;
+use super::blocking::run_blocking;
 use super::guard::with_audit_note;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
@@ -46,13 +47,6 @@ pub(super) struct EditedScript {
 
 fn describe_store_error(what: impl std::fmt::Display) -> ApiProblem {
     ApiProblem::unavailable(what.to_string(), "look at the data directory and at [scripts] directory")
-}
-
-/// Runs what waits for a disk or computes, off the threads that serve.
-pub(super) async fn run_blocking<T: Send + 'static>(
-    work: impl FnOnce() -> Result<T, ApiProblem> + Send + 'static,
-) -> Result<T, ApiProblem> {
-    tokio::task::spawn_blocking(work).await.map_err(|_| ApiProblem::internal_error())?
 }
 
 pub(super) fn check_name(name: &str) -> Result<(), ApiProblem> {

@@ -1,12 +1,13 @@
 //! The settings of the scripts over the API: every one that is declared, with what is in force; one changed by a setter.
 
 use super::ServerState;
+use super::blocking::run_blocking;
 use super::guard::with_audit_note;
 use super::history::{describe_history_error, read_history};
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::route::Route;
-use super::rules::{on_disk, run_blocking};
+use super::rules::on_disk;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;

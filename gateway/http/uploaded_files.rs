@@ -1,13 +1,14 @@
 //! Files that a person brings to the page: how each is understood, its map, its diagnosis, and three examples whose truth is told afterwards.
 
 use super::ServerState;
+use super::blocking::run_blocking;
+use super::body::describe_arrival_error;
 use super::diagnoses::{describe_live_refusal, run_document};
 use super::guard::with_audit_note;
 use super::person::{JsonBody, SignedIn};
 use super::problem::ApiProblem;
 use super::query::QueryKeys;
 use super::route::Route;
-use super::rules::run_blocking;
 use crate::gallery;
 use adapters::channel::CHANNELS;
 use adapters::recording::TEXT_COLUMNS;
@@ -16,7 +17,7 @@ use axum::extract::{Extension, Path, Query as Pairs, State};
 use axum::response::Response;
 use axum::routing::{delete, get, post, put};
 use gateway_access::Role;
-use gateway_diagnosis::arriving::{ArrivalError, ArrivingFile};
+use gateway_diagnosis::arriving::ArrivingFile;
 use gateway_diagnosis::clicked_map::ClickedMap;
 use gateway_diagnosis::files::{BroughtFile, FileDiagnoses, FileDiagnosis, MapRefusal};
 use gateway_diagnosis::handle::DiagnosisHandle;
@@ -54,14 +55,6 @@ impl ServerState {
 
 fn describe_io_error(error: std::io::Error) -> ApiProblem {
     describe_arrival_error(error.into())
-}
-
-pub(super) fn describe_arrival_error(error: ArrivalError) -> ApiProblem {
-    let hint = match error {
-        ArrivalError::NoRoom { .. } => "make room on the disk of the data directory, or bring a shorter file",
-        ArrivalError::Io(_) => "look at the data directory",
-    };
-    ApiProblem::unavailable(error.to_string(), hint)
 }
 
 /// `GET /api/v1/files`: what was brought, what was found, and what can be chosen.

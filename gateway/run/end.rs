@@ -1,12 +1,20 @@
 //! The end of `run`: a signal, or a tick that has ended by itself; then the last commit, which waits for the sinks.
 
 use super::outputs::ConfiguredSinks;
-use super::tick::RunFlags;
 use crate::signals::{SignalRequest, Signals};
 use gateway_base::log::{Notice, Severity};
 use gateway_status::Published;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use tokio::sync::watch;
+
+/// What the rest of the process asks of the tick, which sees it at its next turn.
+#[derive(Debug, Default)]
+pub struct RunFlags {
+    /// Finish this tick and end.
+    pub stop: AtomicBool,
+    /// The scripts are to be read again.
+    pub reload: AtomicBool,
+}
 
 /// Returns when a signal has said stop, or the tick has ended by itself, and the history is closed.
 pub(super) async fn wait_for_end(

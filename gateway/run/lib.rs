@@ -4,7 +4,7 @@ pub mod acknowledged_alarms;
 pub mod actuator_worker;
 pub mod command;
 pub mod deadline;
-mod end;
+pub mod end;
 pub mod energy;
 mod facts;
 pub mod health;
@@ -66,7 +66,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use supervisor::Supervisor;
 use thermal::Thermal;
-use tick::{Identity, RunEnd, RunFlags, Ticker};
+use tick::{Identity, RunEnd, Ticker};
 use tokio::net::TcpListener;
 use tokio::sync::watch;
 use tokio::task::JoinSet;
@@ -143,7 +143,7 @@ fn run_once(
     let opening = OpeningReport::start();
     let started = ClockStart::judge_clock(plan, follows);
     let outputs = ConfiguredSinks::from_config(&plan.config);
-    let run_flags = Arc::new(RunFlags::default());
+    let run_flags = Arc::new(end::RunFlags::default());
     let (report, port) = watch::channel(None);
     let (post, inbox) = control::create_queues();
     let marks = Arc::new(ProgressMarks::new());
@@ -228,7 +228,7 @@ fn build_pipeline(plan: &RunPlan, memory: &Path, told: &mut Vec<Notice>) -> (Pip
 
 fn build_ticker(
     plan: &RunPlan,
-    run_flags: &Arc<RunFlags>,
+    run_flags: &Arc<end::RunFlags>,
     (port, marks): (watch::Receiver<Option<String>>, Arc<ProgressMarks>),
     inbox: OrderReceiver,
     (outputs, started): (Option<&ConfiguredSinks>, ClockStart),
@@ -321,7 +321,7 @@ async fn serve_until_end(
     plan: &RunPlan,
     listener: Option<TcpListener>,
     live: watch::Receiver<Option<Published>>,
-    (run_flags, signals): (&Arc<RunFlags>, Option<&mut Signals>),
+    (run_flags, signals): (&Arc<end::RunFlags>, Option<&mut Signals>),
     (report, post, diagnoses): (watch::Sender<Option<String>>, control::OrderSender, Option<DiagnosisHandle>),
     outputs: Option<&ConfiguredSinks>,
 ) {

@@ -1,7 +1,7 @@
 //! The scripts of a running box: delivered at the first start, loaded, watched, reloaded.
 
+use super::end::RunFlags;
 use super::health::{Health, SCRIPTS_MEMORY};
-use super::tick::RunFlags;
 use adapters::clock::TimeNs;
 use gateway_base::log::{Notice, Severity};
 use gateway_base::state_file;

@@ -1,6 +1,7 @@
 //! The tick thread: waits for the tick, samples, steps the pipeline, hands the status over.
 
 use super::command::Commands;
+use super::end::RunFlags;
 use super::energy::EnergyCounter;
 use super::health::Health;
 use super::live_twin::Twin;
@@ -28,7 +29,7 @@ use gateway_sources::sample_feed::SampleFeed;
 use gateway_status::Published;
 use gateway_status::{AlarmStatus, HistoryStatus, Status, StatusProblem, TickStatus};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
 
@@ -37,15 +38,6 @@ const PUBLISH_EVERY: Duration = Duration::from_millis(190);
 
 /// Orders are carried out between two ticks so many times; what comes then waits for the tick.
 const ORDERS_BETWEEN_MAX: u32 = 32;
-
-/// What the rest of the process asks of the tick.
-#[derive(Debug, Default)]
-pub struct RunFlags {
-    /// Finish this tick and end.
-    pub stop: AtomicBool,
-    /// The scripts are to be read again.
-    pub reload: AtomicBool,
-}
 
 /// How a run has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,7 +4,7 @@
 //! A draft counts for nothing until it is put in charge. Two persons may have the same script open: whoever saves second is told,
 //! because each save names the text that it began from.
 
-use crate::reload::compute_digest;
+use gateway_base::files::compute_digest;
 use gateway_base::files::{read_text, replace_file};
 use rules::script::TEXT_MAX;
 use serde::{Deserialize, Serialize};

@@ -3,7 +3,7 @@
 
 use crate::settings;
 use adapter_core::channel::find_nearest_name;
-pub use gateway_base::files::compute_digest;
+use gateway_base::files::compute_digest;
 use gateway_base::files::{Lookout, Mark, Rest, advise_on_read_error, read_mark, read_text, replace_file};
 use rules::script::{
     Host, ScriptFile, ScriptProblem, ScriptSet, SettingValues, TEXT_MAX, list_shipped_scripts, prepare_scripts,
@@ -37,7 +37,7 @@ pub fn write_shipped_scripts(directory: &Path) -> std::io::Result<Furnished> {
     let mut furnished = Furnished::default();
     for file in list_shipped_scripts() {
         let (digest, path) = (compute_digest(file.text.as_bytes()), directory.join(&file.name));
-        let present = std::fs::read(&path).ok().map(|bytes| self::compute_digest(&bytes));
+        let present = std::fs::read(&path).ok().map(|bytes| compute_digest(&bytes));
         match (delivered.insert(file.name.clone(), digest), present) {
             (Some(old), _) if old == digest => {}
             (_, Some(there)) if there == digest => {}

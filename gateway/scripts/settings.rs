@@ -6,8 +6,8 @@
 //!
 //! Two persons may change one setting: each change names the value that it began from, and who comes second is told ([`Refused`]).
 
-use crate::reload::compute_digest;
 use adapter_core::channel::quantity::space_unit;
+use gateway_base::files::compute_digest;
 use gateway_base::files::{read_text, replace_file};
 use gateway_history::Event;
 use rules::script::{

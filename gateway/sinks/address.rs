@@ -8,13 +8,12 @@ use super::opcua::OpcuaTarget;
 use super::parquet::ParquetTarget;
 use super::shdr::ShdrTarget;
 use super::sparkplug::SparkplugTarget;
+use super::target_error::TargetError;
 use super::webhook::WebhookTarget;
-use adapter_core::address::{self, AddressError, AddressProblem, Keys};
+use adapter_core::address::{self, AddressError, Keys};
 use adapter_core::channel::find_nearest_name;
-use gateway_nats::ClusterAddressError;
 use std::fmt;
 use std::str::FromStr;
-use thiserror::Error;
 
 /// The schemes of the notation, each with how an address of it is written.
 pub const SCHEMES: [(&str, &str); 13] = [
@@ -167,61 +166,6 @@ fn no_scheme() -> String {
     format!("no scheme; write one of {}", forms.join(", "))
 }
 
-/// What is wrong with the part of an address that its scheme gives a meaning.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub(super) enum TargetError {
-    /// No sink has this scheme.
-    #[error("{}", describe_unknown_scheme(scheme))]
-    UnknownScheme { scheme: String },
-    /// This program was built without this sink.
-    #[cfg(not(feature = "opcua"))]
-    #[error("this program was built without OPC UA; `cargo build --release --features opcua` makes one that has it")]
-    NotBuiltIn,
-    /// A host is none.
-    #[error(transparent)]
-    Host(AddressProblem),
-    /// The servers of a cluster are none.
-    #[error(transparent)]
-    Cluster(#[from] ClusterAddressError),
-    /// There is no directory to write to.
-    #[error("write the directory, such as parquet:/var/lib/cnc-gateway/lake")]
-    NoDirectory,
-    /// No topic of MQTT can begin so.
-    #[error("{prefix:?} is no beginning of a topic; leave out + and #, and $ at its beginning")]
-    Topic { prefix: String },
-    /// No subject of NATS can begin so.
-    #[error("{prefix:?} is no beginning of a subject; write words with points between, such as cnc.hall-2")]
-    Subject { prefix: String },
-    /// Sparkplug needs a group and a node.
-    #[error("no group and node; write sparkplug://BROKER:1883/GROUP/NODE/DEVICE")]
-    NoNode,
-    /// A name of Sparkplug that is none.
-    #[error("{part:?} is no name of a group, node or device: leave out + and #")]
-    NodeName { part: String },
-    /// What is posted to is none.
-    #[error("{path:?} is no path of an HTTP address; write %20 for a blank")]
-    Path { path: String },
-    /// Nobody could tell who has sent an alarm.
-    #[error("write secret_file=FILE: its first line is the secret that messages are signed with")]
-    NoSecret,
-    /// Mails come from nobody.
-    #[error("write from=ADDRESS: whom the mail server lets send")]
-    NoSender,
-    /// Mails go to nobody.
-    #[error("write to=ADDRESS or to=ADDRESS,ADDRESS: who gets the alarms")]
-    NoRecipient,
-    /// What is written is no address of mail.
-    #[error("{text:?} is no mail address; write one such as shop@works.example, and a list with commas")]
-    Mailbox { text: String },
-    /// A list that belongs to the mail server.
-    #[error("{count} recipients are more than {most}; make a list at the mail server")]
-    TooManyRecipients { count: usize, most: usize },
-    /// A server that lets nobody in.
-    #[cfg(feature = "opcua")]
-    #[error("nobody could sign in: write user= and password_file=, or anonymous=yes")]
-    NoSignIn,
-}
-
 fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, TargetError> {
     match scheme {
         "mqtt" | "mqtts" => MqttTarget::parse(body, keys, scheme == "mqtts").map(SinkTarget::Mqtt),
@@ -237,7 +181,7 @@ fn parse(scheme: &str, body: &str, keys: &mut Keys) -> Result<SinkTarget, Target
             SparkplugTarget::parse(body, keys, scheme == "sparkplugs").map(SinkTarget::Sparkplug)
         }
         "webhook" | "webhooks" => WebhookTarget::parse(body, keys, scheme == "webhooks").map(SinkTarget::Webhook),
-        _ => Err(TargetError::UnknownScheme { scheme: scheme.to_owned() }),
+        _ => Err(TargetError::UnknownScheme { known: describe_unknown_scheme(scheme) }),
     }
 }
 

@@ -1,7 +1,7 @@
 //! What every sink that sends through an MQTT broker has in common: address keys, connection, words.
 
 use super::SinkError;
-use super::address::TargetError;
+use super::target_error::TargetError;
 use adapter_core::address::{Endpoint, Keys, Login, parse_endpoint};
 use device_line::tls::TlsFiles;
 use mqtt::{MqttClient, MqttError, MqttMessage, Options, Outgoing, Qos, Version, Will};

@@ -36,6 +36,7 @@ pub mod shdr;
 pub mod sink_config;
 pub mod sparkplug;
 pub mod status;
+mod target_error;
 pub mod webhook;
 
 pub use address::{SinkAddress, SinkTarget};

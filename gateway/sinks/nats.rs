@@ -6,9 +6,9 @@
 //! delivered when the stream has acknowledged it, with replicas when most of them have it. Where the stream says that it has an item
 //! already which this run has made and never sent, the item is refused and told: something else sends under the name of this box.
 
-use super::address::TargetError;
 use super::mqtt::build_document;
 use super::sent_numbers::SentNumbers;
+use super::target_error::TargetError;
 use super::{Batch, Pending, Sink, SinkError};
 use adapter_core::address::Keys;
 use gateway_history::{Item, Outbox};

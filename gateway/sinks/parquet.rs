@@ -4,7 +4,7 @@
 //! have no file yet are written from the history (see [`Reader::export_day`]). So a box that was off, or a directory that was
 //! away, is made up for as long as the history holds the days.
 
-use super::address::TargetError;
+use super::target_error::TargetError;
 use super::{Batch, Pending, Sink, SinkError};
 use adapter_core::address::Keys;
 use adapter_core::clock::TimeNs;

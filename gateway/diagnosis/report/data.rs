@@ -1,8 +1,9 @@
 //! The rows behind the page: runs, what was held out, residuals, and a clock without pauses.
 
-use super::PageInput;
 use super::text::{Tongue, escape_html};
-use recording::{Numbers, Run};
+use crate::context::DiagnosisContext;
+use recording::{Numbers, Recording, Run};
+use rules::physics::explain::Language;
 use rules::twin::diagnosis::Diagnosis;
 use rules::twin::hold_out::{Unit, split_into_units};
 use std::ops::Range;
@@ -13,6 +14,19 @@ pub(super) enum Fit {
     Before,
     /// Refitted with the missing physics.
     After,
+}
+
+/// What the page is made from.
+#[derive(Debug, Clone, Copy)]
+pub struct PageInput<'a> {
+    /// What the page tells of; its rows are those of `recording`.
+    pub diagnosis: &'a Diagnosis,
+    /// The recording it was made from, with the same rows in the same order.
+    pub recording: &'a Recording,
+    /// What is said besides: units that are doubtful, the series that was given.
+    pub context: &'a DiagnosisContext,
+    /// Language of the page.
+    pub language: Language,
 }
 
 /// Everything the sections read.

@@ -23,11 +23,8 @@ mod tests;
 mod text;
 mod verdict;
 
-use crate::context::DiagnosisContext;
 use data::Data;
-use recording::Recording;
-use rules::physics::explain::Language;
-use rules::twin::diagnosis::Diagnosis;
+pub use data::PageInput;
 use std::fmt::Write as _;
 pub use text::escape_html;
 
@@ -35,19 +32,6 @@ pub use text::escape_html;
 const STYLE: &str = include_str!("style.css");
 /// The read-out under the pointer.
 const READ_OUT: &str = include_str!("read_out.js");
-
-/// What the page is made from.
-#[derive(Debug, Clone, Copy)]
-pub struct PageInput<'a> {
-    /// What the page tells of; its rows are those of `recording`.
-    pub diagnosis: &'a Diagnosis,
-    /// The recording it was made from, with the same rows in the same order.
-    pub recording: &'a Recording,
-    /// What is said besides: units that are doubtful, the series that was given.
-    pub context: &'a DiagnosisContext,
-    /// Language of the page.
-    pub language: Language,
-}
 
 /// The page as HTML. Time and memory grow linearly with the rows, its size does not.
 #[must_use]

@@ -1,6 +1,7 @@
 //! The enable is withdrawn: when nothing is asked for any more, at the end, and once after every start in case an earlier run
 //! could not. A withdrawal that the machine refuses is repeated until it is taken.
 
+use super::owed::{Owed, UNREACHED_AGAIN_NS};
 use super::{Occasion, OverrideWriter, PendingWrite, WriteRecord};
 use crate::fault::Fault;
 use adapter_core::clock::{Clock, SECOND_NS, TimeNs};
@@ -9,37 +10,6 @@ use adapter_core::{Actuator, LadderRule, SourceError};
 
 /// A withdrawal that the machine refused is tried again after this time.
 const WITHDRAW_AGAIN_NS: i64 = SECOND_NS / 2;
-/// The same while the machine is off or cannot be reached.
-const UNREACHED_AGAIN_NS: i64 = 5 * SECOND_NS;
-
-/// The enable that has to be withdrawn and is not yet.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Owed {
-    /// Of an earlier run: it is not known whether anything is enabled.
-    leftover: bool,
-    /// Not tried again before.
-    next_ns: TimeNs,
-    /// A refusal is told once.
-    told: bool,
-}
-
-impl Owed {
-    /// Nobody knows what an earlier run has left.
-    pub(super) fn from_leftover() -> Self {
-        Self { leftover: true, next_ns: TimeNs::MIN, told: false }
-    }
-
-    /// An override of this run is enabled.
-    fn at_once() -> Self {
-        Self { leftover: false, ..Self::from_leftover() }
-    }
-
-    /// The same, and the machine could not be reached at this moment.
-    pub(super) fn from_unreached(at_ns: TimeNs) -> Self {
-        Self { next_ns: at_ns.saturating_add(UNREACHED_AGAIN_NS), ..Self::at_once() }
-    }
-}
-
 impl<A: Actuator> OverrideWriter<A> {
     /// Gives the machine back to its dial, if an override of ours is enabled or its withdrawal has failed before.
     pub fn release_machine(&mut self, clock: &dyn Clock) -> Option<WriteRecord> {

@@ -1,8 +1,8 @@
 //! A time range as CSV.
 
 use super::super::error::{HistoryError, add_path};
-use super::super::info::format_utc;
 use super::super::query::{Chunk, Query};
+use super::super::readable_time::format_utc;
 use super::super::reader::Reader;
 use super::{ColumnPlan, RUN, run_text};
 use flate2::Compression;

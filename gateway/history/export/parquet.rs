@@ -1,9 +1,9 @@
 //! A time range as Parquet: one column per series, values optional, zstd.
 
 use super::super::error::{HistoryError, add_path};
-use super::super::options::SeriesKind;
 use super::super::query::{Chunk, Query};
 use super::super::reader::Reader;
+use super::super::series_kind::SeriesKind;
 use super::{ColumnPlan, RUN, run_text};
 use ::parquet::basic::{Compression, LogicalType, Repetition, TimeUnit, Type as Physical, ZstdLevel};
 use ::parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};

@@ -1,9 +1,9 @@
 //! A time range as a recording in memory, for `diagnose`, `identify` and back-tests.
 
 use super::super::error::HistoryError;
-use super::super::options::SeriesKind;
 use super::super::query::{Chunk, Query};
 use super::super::reader::Reader;
+use super::super::series_kind::SeriesKind;
 use super::{ColumnPlan, RUN, run_text};
 use recording::Recording;
 use recording::{Cells, Numbers, Words};

@@ -9,7 +9,7 @@
 //! from the same copy. Epoch 0 is what was numbered before there were epochs.
 
 use super::number::to_stored_number;
-use super::store::read_property;
+use super::property::read_property;
 use crate::HistoryError;
 use crate::error::Doing;
 use rusqlite::{Connection, OptionalExtension};

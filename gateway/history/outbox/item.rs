@@ -1,6 +1,6 @@
 //! One thing that leaves the box.
 
-use crate::pyramid::LEVELS;
+use crate::levels::LEVELS;
 use crate::{Series, SeriesKind};
 use adapter_core::ChannelId;
 use adapter_core::channel::{Channel, Form};

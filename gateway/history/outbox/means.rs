@@ -7,7 +7,7 @@
 use super::line;
 use crate::HistoryError;
 use crate::error::Doing;
-use crate::pyramid::{LEVELS, Level};
+use crate::levels::{LEVELS, Level};
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use rusqlite::Connection;
 use std::collections::BTreeSet;

@@ -2,10 +2,10 @@
 //! to have been wrong. What is due stands in `meta` until the commit that tells it.
 
 use super::means::Bucket;
-use super::store::read_property;
+use super::property::read_property;
 use crate::HistoryError;
 use crate::error::Doing;
-use crate::pyramid::LEVELS;
+use crate::levels::LEVELS;
 use adapter_core::clock::TimeNs;
 use rusqlite::Connection;
 use std::collections::BTreeSet;

@@ -32,6 +32,7 @@ mod means;
 mod means_again;
 mod number;
 mod position;
+mod property;
 mod reader;
 mod redate;
 mod report;

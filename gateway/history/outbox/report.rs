@@ -205,12 +205,12 @@ fn put_cell(out: &mut String, cell: &Last, reasons: &Reasons) {
 mod tests {
     use super::*;
     use crate::series::stored_series;
-    use crate::{ExtraSeries, ExtraValue, Options};
+    use crate::{ExtraSeries, ExtraValue, Fidelity};
     use adapter_core::{Absence, ChannelId, Sample, Slot, Value};
 
     fn series() -> Vec<Series> {
         let extras = vec![ExtraSeries::new_text("state", "", "")];
-        let mut series = stored_series(&Options { extras, ..Options::default() }).expect("fine");
+        let mut series = stored_series(Fidelity::Resolution, &extras).expect("fine");
         (1..).zip(&mut series).for_each(|(id, series)| series.id = id);
         series
     }

@@ -4,6 +4,7 @@ use super::epoch;
 use super::handle::{DeliveryState, Outbox, OutboxFigures};
 use super::number::{read_item_number, to_stored_number};
 use super::position::Position;
+use super::property::read_property;
 use crate::HistoryError;
 use crate::error::Doing;
 use crate::schema::{open_for_reading, open_for_writing};
@@ -171,12 +172,6 @@ pub fn box_id(path: &Path, machine: &str) -> Result<String, HistoryError> {
 /// The name of the box of an open history, where it has one.
 pub(crate) fn known_box_id(db: &Connection) -> Result<Option<String>, HistoryError> {
     read_property(db, "outbox_box_id")
-}
-
-pub(super) fn read_property(db: &Connection, key: &str) -> Result<Option<String>, HistoryError> {
-    db.query_row("SELECT CAST(value AS TEXT) FROM meta WHERE key = ?1", [key], |row| row.get(0))
-        .optional()
-        .with_activity("reading the outbox")
 }
 
 /// Letters, digits and `-` of a machine's name, `box` where there are none.

@@ -2,8 +2,8 @@
 //! when they are read. Only the main file of a database is looked at; everything else goes straight to the system.
 #![allow(unsafe_code, reason = "SQLite calls these functions through C and hands over plain memory")]
 
+use super::SEALED_APPLICATION;
 use super::sum::{self, FileHeader, HEADER, ROOM};
-use crate::schema::SEALED_APPLICATION;
 use rusqlite::{Connection, ffi};
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::ptr::null_mut;

@@ -25,6 +25,9 @@
 mod ffi;
 mod sum;
 
+/// `cncs`, stored as `application_id` of files whose pages have sums (the [module](self)).
+pub(super) const SEALED_APPLICATION: u32 = 0x636e_6373;
+
 pub(super) use ffi::{VFS, damaged_page, register_layer, reserve_room};
 
 /// Has the page of this number a sum, and is it right?

@@ -89,7 +89,7 @@ fn put_header(path: &Path) -> std::io::Result<()> {
     if !(1..=schema::SCHEMA).contains(&version) {
         page[60..64].copy_from_slice(&(schema::SCHEMA as u32).to_be_bytes());
     }
-    let application = if sealed { schema::SEALED_APPLICATION } else { schema::APPLICATION as u32 };
+    let application = if sealed { pages::SEALED_APPLICATION } else { schema::APPLICATION as u32 };
     page[68..72].copy_from_slice(&application.to_be_bytes());
     page[72..92].fill(0);
     // The length of the file counts where these two agree.

@@ -1,8 +1,7 @@
 //! Row by row from one file into another, past what cannot be read.
 
 use super::super::block::{BlockKey, StoredBlock};
-use super::super::damage::is_of_disk;
-use super::super::error::{Doing, HistoryError};
+use super::super::error::{Doing, HistoryError, is_of_disk};
 use rusqlite::types::Value;
 use rusqlite::{Connection, OptionalExtension, Row, params_from_iter};
 

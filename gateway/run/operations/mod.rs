@@ -9,24 +9,15 @@ use adapters::Sample;
 use gateway_base::files::Lookout;
 use gateway_base::log::{Notice, Severity};
 use gateway_status as status;
-use rules::operations::{Completion, Lookup, Recipe};
+use rules::operations::{Completion, Lookup};
 use rules::script::ScriptProblem;
 use std::path::{Path, PathBuf};
 use watch::RecipeResult;
 
-pub use watch::read;
+pub use watch::{LoadedRecipe, read};
 
 /// Who writes the events.
 pub const SOURCE: &str = "operations";
-
-/// A recipe and the text it was read from.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LoadedRecipe {
-    /// The operations as they are looked up.
-    pub recipe: Recipe,
-    /// The whole text of the file.
-    pub text: String,
-}
 
 /// The operations recipe in force: read at the start, watched, swapped when the whole file is right.
 #[derive(Debug)]

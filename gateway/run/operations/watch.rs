@@ -1,10 +1,18 @@
 //! The recipe on disk, read and checked beside the tick.
 
-use super::LoadedRecipe;
 use gateway_base::files::{Lookout, Rest, advise_on_read_error, read_mark, read_text};
-use rules::operations::{TEXT_MAX, parse};
+use rules::operations::{Recipe, TEXT_MAX, parse};
 use rules::script::ScriptProblem;
 use std::path::Path;
+
+/// A recipe and the text it was read from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadedRecipe {
+    /// The operations as they are looked up.
+    pub recipe: Recipe,
+    /// The whole text of the file.
+    pub text: String,
+}
 
 /// The recipe in a file.
 ///

@@ -7,8 +7,8 @@
 mod connection;
 mod message;
 
-use super::address::TargetError;
 use super::alarms::{AlarmChoice, AlarmLine, AlarmMessage, AlarmSink, reuse_connection};
+use super::target_error::TargetError;
 use super::{Pending, SinkError};
 use adapter_core::address::{Endpoint, Keys, Login, parse_endpoint};
 use connection::{RefusedRecipients, SmtpConnection, describe_refused};

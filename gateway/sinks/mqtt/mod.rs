@@ -19,7 +19,7 @@ pub(super) use layout::build_document;
 use super::broker::{BrokerFailure, BrokerTarget, Link, client_name};
 use super::requests::format_outcome;
 use super::{Batch, Pending, Requests, Sink, SinkError};
-use crate::address::TargetError;
+use crate::target_error::TargetError;
 use adapter_core::address::Keys;
 use gateway_base::log::{Notice, Severity};
 use gateway_base::machine_path::MachinePath;

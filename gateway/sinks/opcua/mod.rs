@@ -23,7 +23,7 @@ mod values;
 
 use super::listen::listen_on;
 use super::{Batch, Pending, Sink, SinkError};
-use crate::address::TargetError;
+use crate::target_error::TargetError;
 use adapter_core::address::{Endpoint, Keys, Login, parse_endpoint};
 use gateway_history::{Content, Item, Outbox, Record};
 use server::Running;

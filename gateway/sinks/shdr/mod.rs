@@ -17,7 +17,7 @@ pub use devices::{Described, DevicesError, devices_xml, is_prefix, prefix_of};
 
 use super::listen::listen_on;
 use super::{Batch, Pending, Sink, SinkError};
-use crate::address::TargetError;
+use crate::target_error::TargetError;
 use adapter_core::address::{Endpoint, Keys, parse_endpoint};
 use adapter_core::clock::TimeNs;
 use gateway_base::clock;

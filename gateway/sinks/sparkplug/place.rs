@@ -1,7 +1,7 @@
 //! Where the machine stands among the nodes of Sparkplug: as the address says, or as its path does.
 
-use crate::address::TargetError;
 use crate::broker::BrokerTarget;
+use crate::target_error::TargetError;
 use adapter_core::address::Keys;
 use gateway_base::machine_path::MachinePath;
 

@@ -7,10 +7,10 @@
 
 mod client;
 
-use super::address::TargetError;
 use super::alarms::{AlarmChoice, AlarmLine, AlarmMessage, AlarmSink, reuse_connection};
 use super::mqtt::build_document;
 use super::nats::format_message_id;
+use super::target_error::TargetError;
 use super::{Pending, SinkError};
 use adapter_core::address::{Endpoint, Keys, parse_endpoint};
 pub(crate) use client::format_place;

@@ -1,13 +1,10 @@
 //! What is shown and stored.
 
-use super::pair::Pair;
-use gateway_history::{ExtraSeries, ExtraValue};
+use gateway_history::ExtraSeries;
 use serde::Serialize;
 
 /// How many series there are: lag, its standard deviation and what is applied, for either power.
 pub const SERIES: usize = 6;
-/// Half a 95 % interval in standard deviations.
-const Z95: f64 = 1.96;
 
 /// The lag between the controller and a meter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -59,17 +56,4 @@ pub fn list_series() -> Vec<ExtraSeries> {
         seconds("total_power_lag_sd_s", "Standard deviation of the lag of the machine's meter", "整机功率计滞后标准差"),
         seconds("total_power_lag_applied_s", "Lag taken off the machine's meter", "整机功率计已校正滞后"),
     ]
-}
-
-/// The values of one tick, in the order of [`list_series`].
-pub(super) fn collect_values(pairs: [Option<&Pair>; 2]) -> [ExtraValue<'static>; SERIES] {
-    let [spindle, total] = pairs.map(|pair| {
-        let Some(pair) = pair else { return [ExtraValue::Missing("not_provided"); 3] };
-        let lag = pair.lag();
-        let applied = if pair.is_for_merge() { Ok(pair.follower.applied_s()) } else { Err("shown_only") };
-        [lag.map(|lag| lag.lag_s), lag.map(|lag| lag.uncertainty_s / Z95), applied].map(ExtraValue::from)
-    });
-    let [a, b, c] = spindle;
-    let [d, e, f] = total;
-    [a, b, c, d, e, f]
 }

@@ -127,7 +127,7 @@ impl Alignment {
     /// The newest values of [`list_series`].
     #[must_use]
     pub fn current_values(&self) -> [ExtraValue<'static>; SERIES] {
-        delay_status::collect_values(POWERS.map(|name| self.pairs.iter().find(|pair| pair.power_name() == name)))
+        pair::collect_values(POWERS.map(|name| self.pairs.iter().find(|pair| pair.power_name() == name)))
     }
 }
 

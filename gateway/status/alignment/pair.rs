@@ -1,13 +1,16 @@
 //! A controller and a meter: what is gathered, what is known, what is in force.
 
 use super::background::LagResult;
-use super::delay_status::AlignmentStatus;
+use super::delay_status::{AlignmentStatus, SERIES};
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use adapter_core::merge::SourceId;
 use adapter_core::{ChannelId, Reading};
 use gateway_config::AlignmentUse;
+use gateway_history::ExtraValue;
 use rules::estimators::alignment::{Collector, Lag, LagFollower, LagWatch, NotIdentifiable, PowerPoint, SpeedPoint};
 
+/// Half a 95 % interval in standard deviations.
+const Z95: f64 = 1.96;
 /// Pause between two estimates: at first, and at most.
 const PAUSE_NS: (i64, i64) = (60 * SECOND_NS, 600 * SECOND_NS);
 
@@ -180,4 +183,17 @@ impl Pair {
             why,
         }
     }
+}
+
+/// The values of one tick, in the order of [`list_series`](super::delay_status::list_series).
+pub(super) fn collect_values(pairs: [Option<&Pair>; 2]) -> [ExtraValue<'static>; SERIES] {
+    let [spindle, total] = pairs.map(|pair| {
+        let Some(pair) = pair else { return [ExtraValue::Missing("not_provided"); 3] };
+        let lag = pair.lag();
+        let applied = if pair.is_for_merge() { Ok(pair.follower.applied_s()) } else { Err("shown_only") };
+        [lag.map(|lag| lag.lag_s), lag.map(|lag| lag.uncertainty_s / Z95), applied].map(ExtraValue::from)
+    });
+    let [a, b, c] = spindle;
+    let [d, e, f] = total;
+    [a, b, c, d, e, f]
 }
