@@ -15,6 +15,8 @@ mod names;
 mod participles;
 #[path = "reasons.rs"]
 mod reasons;
+#[path = "rooms.rs"]
+mod rooms;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -10,9 +10,9 @@
 //! of what was written: the time of that is the step's reaction time. What is anything else when the machine has had its time
 //! to settle ends the arming.
 
-mod owed;
 mod record;
 mod withdraw;
+mod withdrawal;
 
 pub use record::{Occasion, Reaction, WriteRecord};
 
@@ -23,9 +23,9 @@ use adapter_core::clock::{Clock, SECOND_NS, TimeNs};
 use adapter_core::integer::saturate_to_ns as ns;
 use adapter_core::override_pct::OverridePct;
 use adapter_core::{Actuator, LadderRequest, LadderRule, SourceError};
-use owed::Owed;
 use std::collections::VecDeque;
 use std::sync::Arc;
+use withdrawal::Owed;
 
 /// A ladder waits for at least so many signs of life (`heartbeat_s` is at most a third of its patience).
 const HEARTBEATS_PATIENCE: i64 = 3;

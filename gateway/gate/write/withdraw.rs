@@ -1,7 +1,7 @@
 //! The enable is withdrawn: when nothing is asked for any more, at the end, and once after every start in case an earlier run
 //! could not. A withdrawal that the machine refuses is repeated until it is taken.
 
-use super::owed::{Owed, UNREACHED_AGAIN_NS};
+use super::withdrawal::{Owed, UNREACHED_AGAIN_NS};
 use super::{Occasion, OverrideWriter, PendingWrite, WriteRecord};
 use crate::fault::Fault;
 use adapter_core::clock::{Clock, SECOND_NS, TimeNs};
