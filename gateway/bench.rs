@@ -26,7 +26,7 @@ const STRETCH_NS: i64 = 600 * SECOND_NS;
 /// Between two ticks of machine time: 10 Hz.
 const TICK_NS: i64 = SECOND_NS / 10;
 /// How many channels are merged, inferred from, decided on and stored.
-pub(crate) const CHANNELS: usize = 20;
+pub const CHANNELS: usize = 20;
 
 /// An answer of a source.
 struct Poll {
@@ -36,14 +36,14 @@ struct Poll {
 }
 
 /// The readings of every source, made before the clock of the benchmark starts.
-pub(crate) struct Course {
+pub struct Course {
     plans: Vec<SourcePlan>,
     polls: Vec<Poll>,
 }
 
 /// Why the benchmark could not run.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum BenchError {
+pub enum BenchError {
     /// The simulated machine or the scripts are broken.
     #[error("the benchmark cannot be set up: {0}")]
     SetUp(String),
@@ -57,7 +57,7 @@ impl Course {
     ///
     /// # Errors
     /// [`BenchError::SetUp`].
-    pub(crate) fn from_simulated_lathe() -> Result<Self, BenchError> {
+    pub fn from_simulated_lathe() -> Result<Self, BenchError> {
         let bad = |error: &dyn fmt::Display| BenchError::SetUp(error.to_string());
         let address: Address = "simulated://lathe?seed=1".parse().map_err(|error| bad(&error))?;
         let mut sources = open_pull(&address, 0).map_err(|error| bad(&error))?.sources;
@@ -131,33 +131,33 @@ fn push(merge: &mut Merge, poll: &Poll, shift_ns: i64) {
 
 /// What one run over the same readings costs, with the stages up to `through`.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Figure {
+pub struct Figure {
     /// The last stage that took part.
-    pub(crate) through: &'static str,
+    pub through: &'static str,
     /// Time per tick on the wall, us.
-    pub(crate) us_per_tick: f64,
+    pub us_per_tick: f64,
     /// Processor time per tick of the thread that ticks, us: what other programs take does not count. The wall where
     /// the system does not tell.
-    pub(crate) cpu_us_per_tick: f64,
+    pub cpu_us_per_tick: f64,
     /// Allocations per tick, where they were counted.
-    pub(crate) allocations_per_tick: Option<f64>,
+    pub allocations_per_tick: Option<f64>,
 }
 
 /// The costs of every run, stage by stage.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct BenchFigures {
+pub struct BenchFigures {
     /// Number of ticks that each run lasts.
-    pub(crate) ticks: u64,
+    pub ticks: u64,
     /// In the order of the stages; the last one is the whole box.
-    pub(crate) runs: Vec<Figure>,
+    pub runs: Vec<Figure>,
     /// Each shipped script by itself: its file, and the processor time that it adds to a tick, us.
-    pub(crate) scripts: Vec<(String, f64)>,
+    pub scripts: Vec<(String, f64)>,
     /// Bytes per tick in the history.
-    pub(crate) bytes_per_tick: f64,
+    pub bytes_per_tick: f64,
 }
 
 /// Counts allocations of this process, if somebody does.
-pub(crate) type Allocations = Option<fn() -> u64>;
+pub type Allocations = Option<fn() -> u64>;
 
 struct BenchRun<'a> {
     course: &'a Course,
@@ -201,11 +201,7 @@ impl Store for BenchHistory {
 ///
 /// # Errors
 /// See [`BenchError`].
-pub(crate) fn measure_ticks(
-    ticks: u64,
-    directory: &Path,
-    allocations: Allocations,
-) -> Result<BenchFigures, BenchError> {
+pub fn measure_ticks(ticks: u64, directory: &Path, allocations: Allocations) -> Result<BenchFigures, BenchError> {
     let course = Course::from_simulated_lathe()?;
     let mut bench = BenchRun { course: &course, ticks, allocations, runs: Vec::new() };
     bench.measure_stage("merge", |sample| {
@@ -270,13 +266,13 @@ fn build_pipeline() -> Result<Pipeline, BenchError> {
 impl BenchFigures {
     /// Ticks per second through everything.
     #[must_use]
-    pub(crate) fn ticks_per_s(&self) -> f64 {
+    pub fn ticks_per_s(&self) -> f64 {
         self.runs.last().map_or(0.0, |whole| 1e6 / whole.us_per_tick)
     }
 
     /// Ticks per second of processor time, as on a computer with nothing else to do.
     #[must_use]
-    pub(crate) fn undisturbed_ticks_per_s(&self) -> f64 {
+    pub fn undisturbed_ticks_per_s(&self) -> f64 {
         self.runs.last().map_or(0.0, |whole| 1e6 / whole.cpu_us_per_tick)
     }
 
@@ -332,4 +328,4 @@ impl fmt::Display for BenchFigures {
 }
 
 /// The shortest run that tells anything.
-pub(crate) const TICKS_MIN: u64 = 1000;
+pub const TICKS_MIN: u64 = 1000;

@@ -102,17 +102,22 @@ mod tests {
             means: Vec::new(),
             record: None,
         };
+        let (newer, older) = (row(20, 5.0, false), row(10, 4.0, true));
+        // Means of a time that is over, with their values and without (a clock was put right), say nothing of now.
+        let over = ["gap", "minute", "hour", "day"].map(|kind| FleetRow {
+            kind: kind.into(),
+            numbers: Vec::new(),
+            ..row(90, 0.0, false)
+        });
         let mut latest = Latest::default();
-        latest.add(1, &row(20, 5.0, false), &[3], 21);
-        latest.add(1, &row(10, 4.0, true), &[3], 22);
+        latest.add(1, &newer, &[3], 21);
+        latest.add(1, &older, &[3], 22);
         let found = &latest.boxes[&1];
         assert_eq!((found.first_us, found.last_us, found.arrived_us, found.sequence), (10, 20, 22, 20));
         assert_eq!(found.to_json(), r#"{"3":[20,5.0]}"#);
-        // Means of a time that is over, with their values and without (a clock was put right), say nothing of now.
-        let over = |kind: &'static str| FleetRow { kind: kind.into(), numbers: Vec::new(), ..row(90, 0.0, false) };
-        for kind in ["gap", "minute", "hour", "day"] {
-            latest.add(1, &over(kind), &[], 23);
-            assert_eq!(latest.boxes[&1].last_us, 20, "{kind}");
+        for row in &over {
+            latest.add(1, row, &[], 23);
+            assert_eq!(latest.boxes[&1].last_us, 20, "{}", row.kind);
         }
     }
 }

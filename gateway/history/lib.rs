@@ -43,9 +43,9 @@
 //! `export` ask.
 
 mod audit;
+mod audit_reading;
 #[cfg(test)]
 mod audit_tests;
-mod audit_reading;
 mod block;
 mod commit;
 mod compact;
