@@ -87,6 +87,8 @@ mod series;
 mod series_kind;
 mod set_apart;
 mod space;
+#[cfg(test)]
+mod sparse_rows_tests;
 mod sql;
 mod status;
 mod tail;

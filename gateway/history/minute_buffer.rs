@@ -4,6 +4,7 @@ use super::block::{Block, Encoder, LEVEL_FRESH};
 use super::error::HistoryError;
 use super::levels::MINUTE_NS;
 use super::mailbox::QueuedRecord;
+use super::options::WhenFull;
 use super::reason::Reasons;
 use super::rows::SeriesRows;
 use super::series::Series;
@@ -14,7 +15,8 @@ use std::collections::VecDeque;
 
 /// A block is sealed at this many rows even within its minute: bounds memory at 100 Hz and beyond.
 const BLOCK_ROWS_MAX: usize = 6_000;
-/// Blocks that may wait for the disk; beyond that the oldest is dropped and counted. An hour at one block a minute.
+/// Blocks that may wait for the disk. An hour at one block a minute. Beyond that a live box drops the oldest and counts it; a recording
+/// waits, and has what it had taken on by then.
 const PENDING_MAX: usize = 64;
 
 /// A stretch of increasing time, to be written before its first row.
@@ -57,12 +59,13 @@ pub(crate) struct MinuteBuffer {
     /// Time of the newest row in a block.
     sealed_ns: Option<TimeNs>,
     fresh: bool,
+    when_full: WhenFull,
     /// Rows dropped because the disk took nothing for too long.
     pub(crate) lost_rows: u64,
 }
 
 impl MinuteBuffer {
-    pub(crate) fn new(series: Vec<Series>, end: End) -> Result<Self, HistoryError> {
+    pub(crate) fn new(series: Vec<Series>, end: End, when_full: WhenFull) -> Result<Self, HistoryError> {
         let encoder = Encoder::new(LEVEL_FRESH).map_err(|error| HistoryError::Io { path: "zstd".into(), error })?;
         let open = SeriesRows::for_series(&series);
         Ok(Self {
@@ -81,6 +84,7 @@ impl MinuteBuffer {
             last_ns: end.last_ns,
             sealed_ns: end.last_ns,
             fresh: true,
+            when_full,
             lost_rows: 0,
         })
     }
@@ -129,10 +133,10 @@ impl MinuteBuffer {
         (in_tail.or(self.sealed_ns), self.open_row() + self.in_tail as i64)
     }
 
-    /// Takes a batch on: rows of the same minute gather, a new minute or a clock that went back seals what is there.
-    pub(crate) fn ingest_batch(&mut self, batch: &SeriesRows) {
-        let mut from = 0;
-        while from < batch.len() {
+    /// Takes the rows of a batch on from `from`, until all are or `blocks_max` blocks wait; gives the first that is not. Rows of the same minute
+    /// gather, a new minute or a clock that went back seals what is there.
+    pub(crate) fn ingest_rows(&mut self, batch: &SeriesRows, mut from: usize, blocks_max: usize) -> usize {
+        while from < batch.len() && self.blocks.len() < blocks_max {
             self.prepare_row_at(batch.at_ns[from]);
             let minute = batch.at_ns[from].div_euclid(MINUTE_NS);
             let room = BLOCK_ROWS_MAX - self.open.len();
@@ -150,6 +154,7 @@ impl MinuteBuffer {
             self.last_ns = Some(batch.at_ns[to - 1]);
             from = to;
         }
+        from
     }
 
     /// Makes the open rows ready for one at `at_ns`.
@@ -208,7 +213,7 @@ impl MinuteBuffer {
         self.sealed_ns = Some(block.key.end_ns);
         self.open.clear();
         self.in_tail = 0;
-        if self.is_full() {
+        if self.is_full() && self.when_full == WhenFull::Drop {
             self.lost_rows += self.blocks.pop_front().map_or(0, |oldest| oldest.key.rows.unsigned_abs());
         }
         self.blocks.push_back(block);

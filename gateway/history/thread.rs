@@ -9,6 +9,7 @@ use super::minute_buffer::MinuteBuffer;
 use super::options::{Options, WhenFull};
 use super::outbox::Gatherer;
 use super::record_sql::close_state;
+use super::rows::SeriesRows;
 use super::segments;
 use super::status::SharedStatus;
 use adapter_core::clock::TimeNs;
@@ -108,12 +109,8 @@ impl Thread {
                     &self.minute_buffer.reasons,
                 );
             }
-            self.minute_buffer.ingest_batch(&batch);
+            self.take_rows(&batch);
             self.mailbox.recycle_batch(batch);
-            if self.minute_buffer.blocks.len() >= BLOCKS_PRESSING && self.schedule.failures == 0 {
-                // The next regular commit adds what the running minute has by then.
-                self.commit_pending(false);
-            }
         }
         match delivery.job {
             Some((number, WriterJob::Flush)) => self.schedule.flushing = Some(number),
@@ -127,6 +124,20 @@ impl Thread {
                 self.mailbox.finish_job(number);
             }
             None => {}
+        }
+    }
+
+    /// Takes a batch on, with a commit wherever many blocks wait: rows that are far apart make a block each.
+    fn take_rows(&mut self, batch: &SeriesRows) {
+        let mut from = 0;
+        while from < batch.len() {
+            // While the disk refuses, nothing is gained by trying at every block.
+            let blocks_max = if self.schedule.failures == 0 { BLOCKS_PRESSING } else { usize::MAX };
+            from = self.minute_buffer.ingest_rows(batch, from, blocks_max);
+            if self.minute_buffer.blocks.len() >= BLOCKS_PRESSING && self.schedule.failures == 0 {
+                // The next regular commit adds what the running minute has by then.
+                self.commit_pending(false);
+            }
         }
     }
 

@@ -76,7 +76,7 @@ impl Writer {
         let maintenance = Maintenance::new(path, options.retention, options.reserve_bytes);
         maintenance.bound_log(&db)?;
         let thread = Thread {
-            minute_buffer: MinuteBuffer::new(series, end)?,
+            minute_buffer: MinuteBuffer::new(series, end, options.when_full)?,
             outbox,
             slots: TailSlots::load(&db)?,
             maintenance,
