@@ -212,9 +212,10 @@ fn compare_minutes(plant: &Plant, days: i64) -> u64 {
     compared
 }
 
-/// How many items the command says that it has sent.
+/// How many items the command says that it has sent, in its last line: of a long stretch it tells every minute how far it is.
 fn sent(said: &str) -> u64 {
-    said.split_whitespace().next().and_then(|count| count.parse().ok()).unwrap_or_else(|| panic!("{said}"))
+    let told = said.lines().rev().find_map(|line| line.split_once(" items sent in ")?.0.trim().parse().ok());
+    told.unwrap_or_else(|| panic!("{said}"))
 }
 
 /// How many ticks of the box were compared; `None` where a server is not installed.
