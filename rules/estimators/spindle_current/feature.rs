@@ -45,8 +45,6 @@ pub enum WindowSpan {
     },
 }
 
-impl WindowSpan {}
-
 /// A feature over one window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Feature {

@@ -64,6 +64,12 @@ pub(super) struct EvidenceAnswer {
 pub(super) type Named = (String, Vec<f64>);
 
 impl EvidenceAnswer {
+    /// Becomes what it was; what was tried meanwhile stays in the notes.
+    pub(super) fn restore(&mut self, known: Self) {
+        let debug = std::mem::take(&mut self.debug);
+        *self = Self { debug, ..known };
+    }
+
     /// Probability of a name; `None` of one that no set held.
     pub(super) fn find_probability(&self, name: &str) -> Option<f64> {
         self.probabilities.get(name).copied()

@@ -3,7 +3,6 @@
 //! The first search takes a law on a grid of its shapes, and what the grid misses of a large effect hides a small one, or is given to a name
 //! that is not there. The file has the law as it was fitted; what it leaves is judged by the same rules as any recording beside any model.
 
-use super::contributions::project_out_baseline;
 use super::naming_decision::are_confused;
 use super::report::EvidenceReport;
 use super::search_missing;
@@ -26,7 +25,7 @@ impl EvidenceReport<'_, '_> {
         let curve = self.compute_told_rmse(&self.answer.after);
         let known = self.answer.clone();
         if self.add_names_beside(&textbook, &written).is_none() {
-            self.restore_answer(known);
+            self.answer.restore(known);
             return (textbook, written);
         }
         let wider = self.fit_textbook_laws();
@@ -36,7 +35,7 @@ impl EvidenceReport<'_, '_> {
         let better =
             file.filter(|file| self.measure_prediction(&wider, file).is_some_and(|own| own.compute_lead(before) > 0.0));
         let Some(file) = better else {
-            self.restore_answer(known);
+            self.answer.restore(known);
             return (textbook, written);
         };
         self.doubt_names_beside(&known.names, self.compute_told_rmse(&file.total) < curve);
@@ -66,13 +65,8 @@ impl EvidenceReport<'_, '_> {
         if found.verdict != Verdict::Explained || !found.names.iter().all(is_new) {
             return None;
         }
-        self.answer.contributions = self.list_written_contributions(textbook, written);
         let beside = found.contributions.into_iter().filter(|(name, _)| found.names.contains(name));
-        self.answer.contributions.extend(beside);
-        let project = |(name, x): &(String, Vec<f64>)| {
-            (name.clone(), project_out_baseline(self.inputs, &self.baseline.tangents, x))
-        };
-        self.answer.remaining = self.answer.contributions.iter().map(project).collect();
+        self.set_contributions(self.list_written_contributions(textbook, written).into_iter().chain(beside).collect());
         for name in &found.names {
             let probability = found.probabilities.get(name).copied();
             self.answer.probabilities.extend(probability.map(|probability| (name.clone(), probability)));

@@ -4,7 +4,7 @@
 //! The curve that a set of names was found by is drawn on a grid: a delay between two of its values is made of two laws there, of which a
 //! file needs one.
 
-use super::answer::{EvidenceAnswer, Rival};
+use super::answer::Rival;
 use super::report::EvidenceReport;
 use super::textbook::Textbook;
 use super::thresholds::THRESHOLDS;
@@ -26,13 +26,13 @@ impl EvidenceReport<'_, '_> {
         while let Some(needless) = self.find_needless_name(&textbook) {
             let known = self.answer.clone();
             if !self.drop_name(&textbook, needless) {
-                self.restore_answer(known);
+                self.answer.restore(known);
                 break;
             }
             let fewer = self.fit_textbook_laws();
             let file = fewer.fit.as_ref().and_then(|fit| self.write_fit(fit));
             if file.is_none_or(|file| self.compute_kept_share(&file) < THRESHOLDS.kept_share) {
-                self.restore_answer(known);
+                self.answer.restore(known);
                 break;
             }
             textbook = fewer;
@@ -64,12 +64,6 @@ impl EvidenceReport<'_, '_> {
         true
     }
 
-    /// The answer as it was; what was tried stays in the notes.
-    pub(super) fn restore_answer(&mut self, known: EvidenceAnswer) {
-        let debug = std::mem::take(&mut self.answer.debug);
-        self.answer = EvidenceAnswer { debug, ..known };
-    }
-
     fn find_needless_name(&mut self, textbook: &Textbook) -> Option<Needless> {
         let fit = textbook.fit.as_ref()?;
         let named = self.answer.names.clone();
@@ -78,13 +72,13 @@ impl EvidenceReport<'_, '_> {
         if places.len() < 2 {
             return None;
         }
+        let left_out = self.prepare_left_out(fit).compute_square();
         let mut least: Option<Needless> = None;
         for (name, place) in places {
             let Some(without) = self.fit_without(fit, place) else { continue };
             let information = self.compare_information(fit, &without);
             let limit = least.as_ref().map_or(0.0, |known| known.information);
-            let predicts =
-                self.prepare_left_out(fit).compute_square() < self.prepare_left_out(&without).compute_square();
+            let predicts = left_out < self.prepare_left_out(&without).compute_square();
             if predicts || information >= limit {
                 continue;
             }

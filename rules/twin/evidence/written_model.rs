@@ -94,13 +94,16 @@ impl EvidenceReport<'_, '_> {
         } else if !lawless.is_empty() {
             self.answer.add_unknown_rivals(&lawless);
         }
-        self.answer.contributions = self.list_written_contributions(textbook, &written);
-        let project = |(name, x): &(String, Vec<f64>)| {
-            (name.clone(), project_out_baseline(self.inputs, &self.baseline.tangents, x))
-        };
-        self.answer.remaining = self.answer.contributions.iter().map(project).collect();
+        self.set_contributions(self.list_written_contributions(textbook, &written));
         self.answer.after.clone_from(&written.total);
         written
+    }
+
+    /// What each name adds, and what of it the baseline cannot imitate.
+    pub(super) fn set_contributions(&mut self, contributions: Vec<Named>) {
+        let project = |(name, x): &Named| (name.clone(), project_out_baseline(self.inputs, &self.baseline.tangents, x));
+        self.answer.remaining = contributions.iter().map(project).collect();
+        self.answer.contributions = contributions;
     }
 
     /// Writes a fit and reads it again; `None` where the file would be refused.
