@@ -43,22 +43,18 @@ fn read_clock() -> (i64, u64) {
     (now_ns, now_ns.div_euclid(SECOND_NS).unsigned_abs())
 }
 
-fn to_cannot_run(what: impl ToString) -> CannotRun {
-    CannotRun::new(what.to_string(), "")
-}
-
 pub(super) fn run_backup(arguments: &BackupArguments) -> CommandResult {
     let config = load_configuration(arguments.config.as_deref())?;
     let (_, at_s) = read_clock();
-    let files =
-        collect_files(&BackupPaths::from_config(&config, arguments.config.as_deref())).map_err(to_cannot_run)?;
-    let archive = pack(&files, at_s).map_err(to_cannot_run)?;
+    let files = collect_files(&BackupPaths::from_config(&config, arguments.config.as_deref()))
+        .map_err(CannotRun::from_error)?;
+    let archive = pack(&files, at_s).map_err(CannotRun::from_error)?;
     let out = arguments.out.clone().unwrap_or_else(|| PathBuf::from(archive_name("backup", at_s)));
-    replace_durably(&out, &archive).map_err(|error| to_cannot_run(format!("{}: {error}", out.display())))?;
+    replace_durably(&out, &archive).map_err(|error| CannotRun::from_error(format!("{}: {error}", out.display())))?;
     print_text(&format!("{}: {} files, {} bytes\n", out.display(), files.len(), archive.len()));
     match &arguments.history {
         Some(copy) => {
-            let bytes = copy_history(&config.history.path, copy).map_err(to_cannot_run)?;
+            let bytes = copy_history(&config.history.path, copy).map_err(CannotRun::from_error)?;
             print_text(&format!("{}: the history, {bytes} bytes\n", copy.display()));
         }
         None => print_text("the history is not in it; --history COPY.db copies it beside\n"),
@@ -70,11 +66,12 @@ pub(super) fn run_restore(arguments: &RestoreArguments) -> CommandResult {
     let config = load_configuration(arguments.config.as_deref())?;
     let places = BackupPaths::from_config(&config, arguments.config.as_deref());
     let shown = arguments.archive.display();
-    let bytes = std::fs::read(&arguments.archive).map_err(|error| to_cannot_run(format!("{shown}: {error}")))?;
-    let files = unpack(&bytes).map_err(|error| to_cannot_run(format!("{shown} is no backup: {error}")))?;
+    let bytes =
+        std::fs::read(&arguments.archive).map_err(|error| CannotRun::from_error(format!("{shown}: {error}")))?;
+    let files = unpack(&bytes).map_err(|error| CannotRun::from_error(format!("{shown} is no backup: {error}")))?;
     let (at_ns, at_s) = read_clock();
-    let before = collect_files(&places).map_err(to_cannot_run)?;
-    let before = pack(&before, at_s).map_err(to_cannot_run)?;
+    let before = collect_files(&places).map_err(CannotRun::from_error)?;
+    let before = pack(&before, at_s).map_err(CannotRun::from_error)?;
     let ask = RestoreRequest {
         by: &arguments.by,
         at_ns,

@@ -35,21 +35,17 @@ pub(super) struct ResendArguments {
 /// How often it tells how far it is.
 const TELL_EVERY: Duration = Duration::from_secs(60);
 
-fn to_cannot_run(error: impl std::fmt::Display) -> CannotRun {
-    CannotRun::new(error.to_string(), "")
-}
-
 impl ResendArguments {
     /// From when to when; what the sink has still to deliver comes by itself.
     fn find_range(&self, reader: &Reader, config: &Config) -> Result<(TimeNs, TimeNs), CannotRun> {
-        let (first_ns, newest_ns) = reader.read_present_span().map_err(to_cannot_run)?.unwrap_or((0, 0));
+        let (first_ns, newest_ns) = reader.read_present_span().map_err(CannotRun::from_error)?.unwrap_or((0, 0));
         let at = |text: &Option<String>| {
             text.as_ref().map(|text| moment::parse(text, newest_ns).map_err(CannotRun::from_error)).transpose()
         };
         let from_ns = at(&self.from)?.unwrap_or(first_ns);
         let to_ns = at(&self.to)?.unwrap_or(newest_ns.saturating_add(1));
-        let mut waiting = OutboxReader::open(&config.history.path).map_err(to_cannot_run)?;
-        let oldest_ns = waiting.oldest_waiting_ns(&self.sink).map_err(to_cannot_run)?;
+        let mut waiting = OutboxReader::open(&config.history.path).map_err(CannotRun::from_error)?;
+        let oldest_ns = waiting.oldest_waiting_ns(&self.sink).map_err(CannotRun::from_error)?;
         Ok((from_ns, to_ns.min(oldest_ns.unwrap_or(to_ns))))
     }
 
@@ -61,7 +57,7 @@ impl ResendArguments {
         if !(self.rate > 0.0 && self.rate <= 1e6) {
             return Err(CannotRun::new("--rate is out of range", "give a number of items a second above 0"));
         }
-        let name = box_id(&config.history.path, &config.gateway.machine.name).map_err(to_cannot_run)?;
+        let name = box_id(&config.history.path, &config.gateway.machine.name).map_err(CannotRun::from_error)?;
         let outbox = Outbox::of_box(config.gateway.machine.clone(), config.outbox.clone(), &name);
         let resender = Resender::new(&sink.address, &sink.name, &outbox, self.rate).ok_or_else(|| {
             let what = format!("the sink {} cannot take old data beside new", sink.name);
@@ -74,7 +70,7 @@ impl ResendArguments {
 pub(super) async fn resend_stretch(arguments: &ResendArguments) -> CommandResult {
     let config = load_configuration(Some(&arguments.config))?;
     let path = config.history.path.clone();
-    let reader = Reader::open(&path).map_err(to_cannot_run)?;
+    let reader = Reader::open(&path).map_err(CannotRun::from_error)?;
     let (from_ns, to_ns) = arguments.find_range(&reader, &config)?;
     let (mut resender, outbox) = arguments.open_resender(&config)?;
     drop(reader);
@@ -106,7 +102,7 @@ pub(super) async fn resend_stretch(arguments: &ResendArguments) -> CommandResult
         }
     }
     resender.close().await;
-    reading.await.map_err(to_cannot_run)?.map_err(to_cannot_run)?;
+    reading.await.map_err(CannotRun::from_error)?.map_err(CannotRun::from_error)?;
     let (sent, refused, seconds) = (resender.sent_count, resender.refused_count, began.elapsed().as_secs_f64());
     print_text(&format!("{sent} items sent in {seconds:.1} s, {refused} refused\n"));
     Ok(CommandOutcome::Fine)

@@ -229,10 +229,10 @@ fn build_removal_row(first: i64, last: i64, hash: String, at_ns: TimeNs, because
 
 /// Older versions removed rows without saying so in the chain: says it once, when such a file gets the newer schema.
 pub(crate) fn account_for_earlier(db: &Connection) -> Result<(), rusqlite::Error> {
-    let has = db.query_row("SELECT 1 FROM sqlite_schema WHERE name = 'audit'", [], |_| Ok(())).optional()?;
+    let has = super::tables::has_table(db, "audit")?;
     let released: Option<i64> =
         db.query_row("SELECT value FROM meta WHERE key = 'audit_released'", [], |row| row.get(0)).optional()?;
-    let Some(last) = released.filter(|_| has.is_some()) else { return Ok(()) };
+    let Some(last) = released.filter(|_| has) else { return Ok(()) };
     let told = db.query_row("SELECT 1 FROM audit WHERE kind = ?1 AND after = ?2", params![REMOVED, last], |_| Ok(()));
     if told.optional()?.is_some() {
         return Ok(());

@@ -3,8 +3,9 @@
 use super::audit::{AuditCheck, AuditEntry, AuditRemoval, BEGINNING, Break, COLUMNS, hash, noted_head, read_entry};
 use super::error::{Doing, HistoryError};
 use super::reader::Reader;
+use super::tables::has_table;
 use adapter_core::clock::TimeNs;
-use rusqlite::{OptionalExtension, params};
+use rusqlite::params;
 
 /// Follows the chain row by row.
 struct AuditChain {
@@ -53,13 +54,8 @@ impl AuditChain {
 }
 
 impl Reader {
-    /// Does the file have the table? One of an older version that nobody has written since does not.
     fn has_audit(&self) -> Result<bool, HistoryError> {
-        self.db
-            .query_row("SELECT 1 FROM sqlite_schema WHERE name = 'audit'", [], |_| Ok(()))
-            .optional()
-            .map(|found| found.is_some())
-            .with_activity("looking for the audit")
+        has_table(&self.db, "audit").with_activity("looking for the audit")
     }
 
     /// Rows of the time range, the newest `limit` of them, oldest first.

@@ -4,17 +4,12 @@ use super::error::{Doing, HistoryError};
 use super::fact::read_fact;
 use super::list::RecordSpan;
 use super::reader::Reader;
+use super::tables::has_table;
 use gateway_records::Fact;
-use rusqlite::OptionalExtension;
 
 impl Reader {
-    /// Does the file have the table? One of an older version that nobody has written since does not.
     fn has_facts(&self) -> Result<bool, HistoryError> {
-        self.db
-            .query_row("SELECT 1 FROM sqlite_schema WHERE name = 'facts'", [], |_| Ok(()))
-            .optional()
-            .map(|found| found.is_some())
-            .with_activity("looking for facts")
+        has_table(&self.db, "facts").with_activity("looking for facts")
     }
 
     /// Facts that happened or began in the range, the newest `limit` of them, oldest first.

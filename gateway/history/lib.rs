@@ -91,6 +91,7 @@ mod space;
 mod sparse_rows_tests;
 mod sql;
 mod status;
+mod tables;
 mod tail;
 mod thread;
 mod vtab;

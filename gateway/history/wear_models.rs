@@ -3,9 +3,10 @@
 use super::error::{Doing, HistoryError};
 use super::reader::Reader;
 use super::schema;
+use super::tables::has_table;
 use adapter_core::clock::TimeNs;
 use adapter_core::model_library::{LibraryModel, LibraryRow, WearKey};
-use rusqlite::{Connection, OptionalExtension, params};
+use rusqlite::{Connection, params};
 use std::path::Path;
 
 /// A model of the library.
@@ -72,12 +73,8 @@ fn insert_wear_model(db: &Connection, at_ns: TimeNs, record: &impl LibraryModel)
     Ok(db.last_insert_rowid())
 }
 
-/// Does the file have the table? One of an older version that nobody has written since does not.
 fn has_library(db: &Connection) -> Result<bool, HistoryError> {
-    db.query_row("SELECT 1 FROM sqlite_schema WHERE name = 'wear_models'", [], |_| Ok(()))
-        .optional()
-        .map(|found| found.is_some())
-        .with_activity("looking for the wear models")
+    has_table(db, "wear_models").with_activity("looking for the wear models")
 }
 
 impl Reader {

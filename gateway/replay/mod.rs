@@ -167,7 +167,7 @@ impl OneFile<'_> {
         let mut sink = ReplaySink { writer, before, counts: ReplayCounts::default() };
         let last_ns = self.feed_pipeline(source, &mut sink, &bar);
         bar.finish_and_clear();
-        close_writer(sink.writer.take())?;
+        close_writer(sink.writer.take(), sink.counts.stored)?;
         Ok((sink.counts, last_ns))
     }
 
@@ -214,11 +214,13 @@ fn open_writer(path: &Path, origin: &str, goes_on: bool, extras: Vec<ExtraSeries
     Writer::open(path, options).map_err(|error| CannotRun::new(error.to_string(), ""))
 }
 
-fn close_writer(writer: Option<Writer>) -> Result<(), CannotRun> {
+/// The end of a file of which so many rows were handed in; an error where the history does not have them all.
+fn close_writer(writer: Option<Writer>, handed_in: u64) -> Result<(), CannotRun> {
     let Some(writer) = writer else { return Ok(()) };
     let flushed = writer.flush();
     let status = writer.close();
-    match status.degraded.or_else(|| flushed.err().map(|error| error.to_string())) {
+    let missing = (status.rows < handed_in).then(|| format!("{} of {handed_in} rows are in the history", status.rows));
+    match status.degraded.or_else(|| flushed.err().map(|error| error.to_string())).or(missing) {
         None => Ok(()),
         Some(reason) => Err(CannotRun::new(
             format!("not everything could be stored: {reason}"),

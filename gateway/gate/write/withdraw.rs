@@ -10,6 +10,7 @@ use adapter_core::{Actuator, LadderRule, SourceError};
 
 /// A withdrawal that the machine refused is tried again after this time.
 const WITHDRAW_AGAIN_NS: i64 = SECOND_NS / 2;
+
 impl<A: Actuator> OverrideWriter<A> {
     /// Gives the machine back to its dial, if an override of ours is enabled or its withdrawal has failed before.
     pub fn release_machine(&mut self, clock: &dyn Clock) -> Option<WriteRecord> {

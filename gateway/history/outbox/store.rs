@@ -8,6 +8,7 @@ use super::property::read_property;
 use crate::HistoryError;
 use crate::error::Doing;
 use crate::schema::{open_for_reading, open_for_writing};
+use crate::tables::has_table;
 use adapter_core::clock::{SECOND_NS, TimeNs};
 use gateway_base::convert::{clamp_to_signed, clamp_to_unsigned, saturate_to_ns};
 use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
@@ -129,10 +130,7 @@ pub(crate) fn create_like(from: &Connection, to: &Connection) -> Result<(), Hist
 
 /// Does the file have the tables?
 pub(super) fn has_tables(db: &Connection) -> Result<bool, HistoryError> {
-    db.query_row("SELECT 1 FROM sqlite_schema WHERE name = 'outbox_sinks'", [], |_| Ok(()))
-        .optional()
-        .map(|found| found.is_some())
-        .with_activity("looking for the outbox")
+    has_table(db, "outbox_sinks").with_activity("looking for the outbox")
 }
 
 /// The name of this box, made once: a machine that is renamed stays the same box. The digits tell boxes apart whose machines

@@ -2,7 +2,7 @@
 
 use crate::cli::{CannotRun, CommandOutcome, CommandResult, print_json, print_text};
 use crate::clock;
-use crate::history::{HistoryError, Reader, StoredWearModel, store_wear_model};
+use crate::history::{Reader, StoredWearModel, store_wear_model};
 use clap::Args;
 use rules::estimators::wear::{WearKey, WearRecord};
 use serde_json::json;
@@ -34,10 +34,6 @@ pub(super) struct LibraryArguments {
     operation: String,
 }
 
-fn to_cannot_run(error: &HistoryError) -> CannotRun {
-    CannotRun::new(error.to_string(), "")
-}
-
 impl LibraryArguments {
     /// What the model is for.
     pub(super) fn wear_key(&self) -> WearKey {
@@ -54,7 +50,7 @@ impl LibraryArguments {
 /// Stores the model where that was asked for; a line that says so.
 pub(super) fn store_model(arguments: &LibraryArguments, record: &WearRecord) -> Result<Option<String>, CannotRun> {
     let Some(path) = &arguments.store else { return Ok(None) };
-    let id = store_wear_model(path, clock::now_ns(), record).map_err(|error| to_cannot_run(&error))?;
+    let id = store_wear_model(path, clock::now_ns(), record).map_err(CannotRun::from_error)?;
     Ok(Some(format!("\nstored as model {id} in {}: {}\n", path.display(), format_key(&record.key))))
 }
 
@@ -70,8 +66,8 @@ fn format_key(key: &WearKey) -> String {
 
 /// Prints every model of the library.
 pub(super) fn list_models(arguments: &LibraryArguments, as_json: bool) -> CommandResult {
-    let reader = Reader::open(&arguments.history).map_err(|error| to_cannot_run(&error))?;
-    let models = reader.wear_models().map_err(|error| to_cannot_run(&error))?;
+    let reader = Reader::open(&arguments.history).map_err(CannotRun::from_error)?;
+    let models = reader.wear_models().map_err(CannotRun::from_error)?;
     if as_json {
         let each: Vec<_> = models.iter().map(model_to_json).collect();
         print_json(&json!({ "schema": "wear-models/1", "models": each }));
