@@ -322,7 +322,7 @@ const escaped = (text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");
 /** From a table to what finds the Chinese of a whole sentence; it gives nothing where the sentence is none of the table. What is filled in
     stays as it is, unless it is one itself. */
 function translator(table) {
-  const patterns = table.map(([en, zh]) => [
+  const build = ([en, zh]) => [
     new RegExp(
       `^${en
         .split(/\{\d\}/)
@@ -332,8 +332,11 @@ function translator(table) {
     ),
     [...en.matchAll(/\{(\d)\}/g)].map((it) => Number(it[1])),
     zh,
-  ]);
+  ];
+  // Made when the first sentence is asked for: whoever reads English asks for none.
+  let patterns = null;
   return function translate(text) {
+    patterns ??= table.map(build);
     for (const [pattern, places, zh] of patterns) {
       const found = pattern.exec(text);
       const filled = (at) => found[places.indexOf(Number(at)) + 1] ?? "";
