@@ -141,8 +141,8 @@ pub(super) const FIGURES: [FigureRow; 17] = [
     (
         "learned_multiple",
         "1",
-        "Cutting power, less two standard deviations, over the greatest of the first parts at this place; in a cut that is under way there",
-        "切削功率（减两倍标准差）与示教最大功率之比",
+        "Cutting power, less two standard deviations, over the greatest of the first parts at this place, in a cut that is under way there; the least of the last samples, twice as many as the power filter has",
+        "切削功率（减两倍标准差）与示教最大功率之比；取最近若干采样（功率滤波长度的两倍）中的最小值",
         |it| it.loads.learned_multiple,
     ),
     (

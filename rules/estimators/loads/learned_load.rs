@@ -2,6 +2,7 @@
 
 use super::Loads;
 use super::follower::{FedShare, OverrideFollower};
+use super::last_multiples::LastMultiples;
 use super::limits::LearnedLimits;
 use super::load_inputs::{LoadChannels, LoadMoment};
 use super::place::Place;
@@ -53,6 +54,8 @@ pub(super) struct LearnedLoad {
     air_before: f64,
     #[serde(skip)]
     follower: OverrideFollower,
+    #[serde(skip)]
+    multiples: LastMultiples,
 }
 
 impl LearnedLoad {
@@ -60,7 +63,7 @@ impl LearnedLoad {
         let beginning = format!("{program}/");
         self.places.retain(|key, _| !key.starts_with(&beginning));
         self.fall.forget_program(program);
-        self.follower.reset_cut();
+        self.leave_cut();
     }
 
     pub(super) fn update_loads(
@@ -76,7 +79,7 @@ impl LearnedLoad {
         self.watch_part(now, limits, loads);
         let power = now.cutting_power_w.filter(|_| now.cutting);
         let (Some((power_w, sd_w)), Some(key), Some(step_s)) = (power, &self.key, now.step_s) else {
-            self.follower.reset_cut();
+            self.leave_cut();
             self.fall.leave_cut();
             return;
         };
@@ -107,7 +110,7 @@ impl LearnedLoad {
             }
             _ => {}
         }
-        self.follower.reset_cut();
+        self.leave_cut();
         let none = Err(NoEstimate::PlaceNotLearned);
         (loads.learned_power_w, loads.learned_band_w, loads.learned_peak_w) = (none, none, none);
         loads.learned_override_pct = none;
@@ -129,12 +132,12 @@ impl LearnedLoad {
         loads.learned_peak_w = Ok(place.peak_w);
         // At the entry, and where the machine has just come from another place, the power is not yet that of this one.
         if now.state_s.min(seconds_between(self.here_since_ns, now.at_ns)) < limits.entry_s {
-            self.follower.reset_cut();
+            self.leave_cut();
             return;
         }
         self.watch_fall(now, (power_w, step_s, feed), expected.power_w * by_feed, loads);
-        loads.learned_multiple =
-            Ok((power_w - SURE_SD * sd_w) / (place.peak_w.max(expected.power_w) * by_feed.max(1.0)));
+        let multiple = (power_w - SURE_SD * sd_w) / (place.peak_w.max(expected.power_w) * by_feed.max(1.0));
+        loads.learned_multiple = self.multiples.push(multiple, limits.sure_samples).ok_or(NoEstimate::NotYet);
         // The shares between which nothing is asked for; what the meter cannot tell is inside.
         let doubt = (expected.band_w + SURE_SD * sd_w / by_feed) / expected.power_w;
         let high = limits.high_share.max(1.0 + doubt);
@@ -150,6 +153,12 @@ impl LearnedLoad {
         let pct = self.follower.step_override(at, &limits.range, wanted);
         loads.learned_override_pct =
             if (pct - 100.0).abs() < 1e-9 { Err(NoEstimate::NothingToChange) } else { Ok(pct) };
+    }
+
+    /// What was seen of the cut so far is of another one.
+    fn leave_cut(&mut self) {
+        self.follower.reset_cut();
+        self.multiples.clear();
     }
 
     /// Has the tool in use come to take less?
@@ -212,7 +221,7 @@ impl LearnedLoad {
     fn begin_here(&mut self, at_ns: TimeNs) {
         self.path_mm = 0.0;
         self.here_since_ns = at_ns;
-        self.follower.reset_cut();
+        self.leave_cut();
     }
 
     /// The key is put together only where one of its texts has changed.
@@ -239,7 +248,7 @@ impl LearnedLoad {
             self.here_since_ns = sample.at_ns;
             self.air_before = 0.0;
             self.fall.leave_cut();
-            self.follower.reset_cut();
+            self.leave_cut();
         }
         self.changes += 1;
         if let Some(place) = self.key.as_ref().and_then(|key| self.places.get_mut(key)) {

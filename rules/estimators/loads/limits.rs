@@ -4,6 +4,7 @@ use super::curves::LoadCurves;
 use super::follower::OverrideRange;
 use super::load_inputs::LoadChannels;
 use crate::settings::Settings;
+use crate::signals::to_window_length;
 use adapter_core::{Sample, is_same_text};
 use std::sync::Arc;
 
@@ -34,6 +35,8 @@ pub(super) struct LearnedLimits {
     pub(super) low_share: f64,
     pub(super) high_share: f64,
     pub(super) range: OverrideRange,
+    /// A multiple of the learned power must last for so many samples.
+    pub(super) sure_samples: usize,
 }
 
 /// All of them, and what they are of.
@@ -84,6 +87,7 @@ impl LoadSettings {
                 steady_s: settings.constant_load_steady_s,
                 sure_s: LEARNED_SURE_S,
             },
+            sure_samples: 2 * to_window_length(settings.filter_samples),
         };
         Self { tool: tool.cloned(), operation: operation.cloned(), constant, learned }
     }

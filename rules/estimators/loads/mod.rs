@@ -19,6 +19,7 @@ mod constant_load;
 mod curves;
 mod fall_chain;
 mod follower;
+mod last_multiples;
 mod learned_load;
 mod limits;
 mod load_inputs;

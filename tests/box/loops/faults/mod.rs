@@ -273,6 +273,14 @@ fn faults_of_a_mill_are_told_in_shadow() {
     assert_eq!((all, seen, wrong), (4, 4, 0));
 }
 
+/// A shift in which a reading of the meter is ten times the power in a short cut: it lies in two samples, and is no fault.
+#[test]
+fn a_disturbed_reading_of_the_meter_is_no_multiple() {
+    let mill = setups().into_iter().find(|it| it.name == "mill, shadow").expect("it is listed");
+    let counted = run(&mill, 6);
+    assert_eq!(counted.false_alarms, [""; 0]);
+}
+
 /// `cargo test --test box another_maker -- --nocapture`
 #[test]
 fn faults_of_a_mill_of_another_maker_are_told_by_its_recording() {
