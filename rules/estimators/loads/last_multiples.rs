@@ -20,7 +20,7 @@ impl LastMultiples {
         (self.0.len() == length).then(|| self.0.iter().copied().fold(f64::INFINITY, f64::min))
     }
 
-    /// Another cut begins.
+    /// Another cut begins: what was seen so far does not count for it.
     pub(super) fn clear(&mut self) {
         self.0.clear();
     }

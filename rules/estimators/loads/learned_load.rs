@@ -155,7 +155,7 @@ impl LearnedLoad {
             if (pct - 100.0).abs() < 1e-9 { Err(NoEstimate::NothingToChange) } else { Ok(pct) };
     }
 
-    /// What was seen of the cut so far is of another one.
+    /// Nothing that was seen of a cut so far counts any longer.
     fn leave_cut(&mut self) {
         self.follower.reset_cut();
         self.multiples.clear();
