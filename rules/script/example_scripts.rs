@@ -112,7 +112,7 @@ mod tests {
         shop.make_part(10, 1.0, 10, (State::Cutting, 6000.0));
         let multiple = std::mem::take(&mut shop.told);
         let seen = multiple.iter().find(|(name, _)| name == "power_multiple");
-        assert!(seen.is_some_and(|(_, at_s)| (10.0..12.0).contains(at_s)), "{multiple:?}");
+        assert!(seen.is_some_and(|(_, at_s)| (10.0..11.3).contains(at_s)), "{multiple:?}");
         shop.make_part(11, 0.0, 30, cut);
         let dry = std::mem::take(&mut shop.told);
         assert!(matches!(&dry[..], [(name, at_s)] if name == "coolant_missing" && *at_s < 4.0), "{dry:?}");

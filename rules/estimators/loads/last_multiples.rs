@@ -2,9 +2,19 @@
 //!
 //! The filter of the power takes out a disturbance of one sample. A disturbed reading of a meter is more than that: values between two
 //! readings are interpolated, so it lies in `r` samples, where a meter with a reading every `k` samples gives `r <= 2 k - 1`. A filter of
-//! `N` samples lets it through for `N + r - 2` samples at most. So a multiple counts that lasts for longer.
+//! `N` samples lets it through for `N + r - 2` samples at most. So a multiple counts that lasts for `2 N`: that is longer for every
+//! meter with a reading every `(N + 2) / 2` samples or more often, three samples for a filter of five. A meter that is slower beside
+//! such a filter can still have one disturbed reading told as a multiple.
 
 use std::collections::VecDeque;
+
+/// A multiple must last for so many lengths of the filter. More: a real one is told later; fewer: a disturbed reading is told.
+const FILTER_LENGTHS: usize = 2;
+
+/// For how many samples a multiple must last where the filter of the power has so many.
+pub(super) const fn count_sure_samples(filter_length: usize) -> usize {
+    FILTER_LENGTHS * filter_length
+}
 
 /// The multiples at the last samples of a cut.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -31,15 +41,15 @@ mod tests {
     use super::*;
     use crate::filter::AntiPulse;
 
-    /// The greatest multiple that is told of a power of 1, in which readings of a meter from `from` on are as given, in a meter with a
-    /// reading every `k` samples and a filter of `length`.
+    /// The greatest multiple that is told of a meter whose readings are as given, one every `k` samples, behind a filter of `length`.
     fn find_greatest(length: usize, k: usize, disturbed: impl Fn(usize) -> f64) -> f64 {
         let (mut filter, mut last) = (AntiPulse::new(length), LastMultiples::default());
         let mut greatest = 0.0_f64;
         for sample in 0..100 * k {
             let (reading, share) = (sample / k, (sample % k) as f64 / k as f64);
             let power = disturbed(reading) * (1.0 - share) + disturbed(reading + 1) * share;
-            if let Some(multiple) = filter.push(power).and_then(|mean| last.push(mean, 2 * length)) {
+            let sure = count_sure_samples(length);
+            if let Some(multiple) = filter.push(power).and_then(|mean| last.push(mean, sure)) {
                 greatest = greatest.max(multiple);
             }
         }

@@ -2,6 +2,7 @@
 
 use super::curves::LoadCurves;
 use super::follower::OverrideRange;
+use super::last_multiples::count_sure_samples;
 use super::load_inputs::LoadChannels;
 use crate::settings::Settings;
 use crate::signals::to_window_length;
@@ -87,7 +88,7 @@ impl LoadSettings {
                 steady_s: settings.constant_load_steady_s,
                 sure_s: LEARNED_SURE_S,
             },
-            sure_samples: 2 * to_window_length(settings.filter_samples),
+            sure_samples: count_sure_samples(to_window_length(settings.filter_samples)),
         };
         Self { tool: tool.cloned(), operation: operation.cloned(), constant, learned }
     }
