@@ -1,7 +1,7 @@
 //! The loop of `fleet ingest`: fetch, write, commit, acknowledge; after any failure again from the beginning.
 //!
-//! While a batch is written the next one is fetched, and a second reader beside the first decodes while the database is at work for the other.
-//! An item that the database does not take is found by halving its batch, and kept in
+//! While a batch is written the next one is fetched. One reader takes the batches in the order of the stream: at which machine a box
+//! stands, and what it is called, is known by what came before. An item that the database does not take is found by halving its batch, and kept in
 //! the table `refused`; the others are written.
 
 use super::database::DatabaseSettings;
@@ -10,8 +10,6 @@ use super::write::{BatchResult, Database, RefusalRecord};
 use crate::row::Arrived;
 use gateway_base::log::{Notice, Severity};
 use gateway_nats::{Connection, FetchLimits, Message, NatsError, NatsTarget, StreamSettings};
-use std::sync::Mutex;
-use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
 /// A batch is one transaction of some megabytes: larger ones gain little, and are given out again when they take longer than the
@@ -55,20 +53,9 @@ pub struct Done {
     pub refused: u64,
 }
 
-/// What the readers of this process have in common.
-#[derive(Debug, Default)]
-struct IngestProgress {
-    done: Done,
-    /// The failure that was told last.
-    failure: String,
-}
-
-/// One of the readers that share the work.
 struct Ingest<'a> {
     settings: &'a IngestSettings,
-    progress: &'a Mutex<IngestProgress>,
-    /// The first tells what all of them do.
-    is_first: bool,
+    done: Done,
     last_report: Instant,
     /// The server with which the next connection begins.
     server: usize,
@@ -79,42 +66,31 @@ struct Ingest<'a> {
 /// # Errors
 /// With `once`, the failure that ended it.
 pub async fn run(settings: &IngestSettings) -> Result<Done, NatsError> {
-    let progress = Mutex::new(IngestProgress::default());
-    let reader = |is_first| Ingest { settings, progress: &progress, is_first, last_report: Instant::now(), server: 0 };
-    let (mut first, mut second) = (reader(true), reader(false));
-    tokio::try_join!(first.run_sessions(), second.run_sessions())?;
-    let done = first.update(|progress| progress.done);
-    Ok(done)
+    let mut ingest = Ingest { settings, done: Done::default(), last_report: Instant::now(), server: 0 };
+    let mut pause = PAUSE_FIRST;
+    let mut last = String::new();
+    loop {
+        let before = ingest.done;
+        match ingest.run_session().await {
+            Ok(()) => return Ok(ingest.done),
+            Err(error) if settings.once => return Err(error),
+            Err(error) => {
+                if ingest.done != before {
+                    (pause, last) = (PAUSE_FIRST, String::new());
+                }
+                let text = error.to_string();
+                if text != last {
+                    Notice::new(Severity::Warning, "ingest_failed", text.clone()).write_to_logs();
+                    last = text;
+                }
+                tokio::time::sleep(pause).await;
+                pause = (2 * pause).min(PAUSE_MAX);
+            }
+        }
+    }
 }
 
 impl Ingest<'_> {
-    fn update<T>(&self, change: impl FnOnce(&mut IngestProgress) -> T) -> T {
-        change(&mut self.progress.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-
-    async fn run_sessions(&mut self) -> Result<(), NatsError> {
-        let mut pause = PAUSE_FIRST;
-        loop {
-            let before = self.update(|progress| progress.done);
-            let Err(error) = self.run_session().await else { return Ok(()) };
-            if self.settings.once {
-                return Err(error);
-            }
-            let text = error.to_string();
-            let is_new = self.update(|told| {
-                if told.done != before {
-                    (pause, told.failure) = (PAUSE_FIRST, String::new());
-                }
-                std::mem::replace(&mut told.failure, text.clone()) != text
-            });
-            if is_new {
-                Notice::new(Severity::Warning, "ingest_failed", text).write_to_logs();
-            }
-            tokio::time::sleep(pause).await;
-            pause = (2 * pause).min(PAUSE_MAX);
-        }
-    }
-
     /// From connecting to the first failure, or to the end of the work.
     async fn run_session(&mut self) -> Result<(), NatsError> {
         let IngestSettings { target: servers, stream, consumer, database, once } = self.settings;
@@ -128,10 +104,8 @@ impl Ingest<'_> {
             Notice::new(Severity::Info, "stream_created", text).write_to_logs();
         }
         connection.create_consumer(&stream.name, consumer).await?;
-        if self.is_first {
-            let text = format!("taking items from stream {}", stream.name);
-            Notice::new(Severity::Info, "ingest_running", text).write_to_logs();
-        }
+        Notice::new(Severity::Info, "ingest_running", format!("taking items from stream {}", stream.name))
+            .write_to_logs();
         let last_number = if *once { Some(connection.read_last_number(&stream.name).await?) } else { None };
         let limits = FetchLimits { messages: BATCH_MESSAGES, bytes: BATCH_BYTES, patience: PATIENCE };
         let mut batch = connection.fetch_messages(&stream.name, consumer, limits).await?;
@@ -154,7 +128,7 @@ impl Ingest<'_> {
                     return connection.flush().await;
                 }
             }
-            if self.is_first && self.last_report.elapsed() >= TELL_EVERY {
+            if self.last_report.elapsed() >= TELL_EVERY {
                 self.last_report = Instant::now();
                 let pending = connection.read_backlog(&stream.name, consumer).await?.pending;
                 self.report_progress(pending);
@@ -163,11 +137,9 @@ impl Ingest<'_> {
     }
 
     fn count_written(&mut self, written: Written) {
-        self.update(|IngestProgress { done, .. }| {
-            done.new += written.result.new;
-            done.known += written.result.known;
-            done.refused += written.refused.len() as u64;
-        });
+        self.done.new += written.result.new;
+        self.done.known += written.result.known;
+        self.done.refused += written.refused.len() as u64;
         // One of them is enough to go and look.
         if let Some(RefusalRecord { subject, reason, .. }) = written.refused.first() {
             let text =
@@ -177,7 +149,7 @@ impl Ingest<'_> {
     }
 
     fn report_progress(&self, pending: u64) {
-        let Done { new, known, refused } = self.update(|progress| progress.done);
+        let Done { new, known, refused } = self.done;
         let text =
             format!("{new} rows written, {known} known already, {refused} refused; {pending} wait in the stream");
         Notice::new(Severity::Info, "ingest", text).write_to_logs();
